@@ -15,8 +15,12 @@ from sheetbend.cli.app import app
 from sheetbend.config import Study, build, parse
 from sheetbend.doubts.driven_errors import FEW, drawn_noise, driven_errors
 from sheetbend.doubts.driven_noise import driven_doubts, driven_noises
+from sheetbend.experiment.driven_motion import estimated_motion
+from sheetbend.fitting.fitted_motion import fitted_positions
+from sheetbend.minimum.linear_step import residuals_there
 from sheetbend.minimum.optimizers import Progress, minimize
 from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.minimum.time_step import halved
 from sheetbend.statistics.identifiability import identify
 from typer.testing import CliRunner
 
@@ -235,7 +239,7 @@ def test_clean_driven_markers_give_what_a_fit_without_correction_does():
         assert fit[name].half_width == approx(plain[name].half_width, rel=0.02)
 
 
-def test_a_report_says_what_was_corrected_and_predictions_go_on_as_recorded():
+def test_a_report_says_what_was_corrected_and_predictions_go_on_smoothed():
     e = shaken(7, frames=61, fit=(0.0, 0.7), held_out=(0.7, 1.01))
     fit = sb.fit(e, parameters=WANTED, profiles=False)
     assert "its driven markers are moved by 0.1" in fit.report()
@@ -244,10 +248,15 @@ def test_a_report_says_what_was_corrected_and_predictions_go_on_as_recorded():
     row = fit.result.recordings[0]
     assert row.driven_sigma == NOISE and row.corrected_by == approx(np.sqrt(np.mean(b**2)))
     assert b.shape[0] == 44  # the fitted frames' knots and those that reach into them
-    corrected = e.recording.positions[:, 0].copy()
-    corrected[: len(b)] += b[:, 0]
-    again = sb.simulate(rope(e.recording.times, corrected), e.recording.times, sb.Solver(h=H), fit.values_of(e))
+    times, recorded = e.recording.times, e.recording.positions[:, 0]
+    motion = estimated_motion(e, b)
+    assert motion is not None
+    corrected = motion.positions[:, 0]
+    assert corrected[:42] == approx((recorded[: len(b)] + b[:, 0])[:42])
+    assert np.std((corrected - hand(times))[42:]) < 0.8 * np.std((recorded - hand(times))[42:])
+    again = sb.simulate(rope(times, corrected), times, sb.Solver(h=H), fit.values_of(e))
     assert fit.comparisons[0].simulated == approx(again.positions[:, SEEN], abs=1e-9)
+    assert fitted_positions(fit, fit.comparisons[0]) == approx(again.nodes, abs=1e-9)
     assert not fit.result.warnings
 
 
@@ -266,6 +275,18 @@ def test_windows_starts_refinement_and_leaving_out_work_with_corrections():
     assert all(row.held_out is not None for row in fit.result.recordings)
     ends = [start.values["rope_EI"] for start in fit.result.starts]
     assert ends[0] == approx(ends[1], rel=1e-4)
+
+
+def test_a_refinement_begins_with_the_corrections_of_the_fit():
+    e = shaken(8, frames=25)
+    problem = problem_of(e)
+    u, _ = at(problem, e)
+    assert problem.evaluate(u)[0]
+    alone, begun, finer = (problem.of(halved([e])) for _ in range(3))
+    found = residuals_there(problem, finer, u)
+    begun.core.restore(problem.core.state())
+    assert np.array_equal(found, begun.evaluate(u, jacobian=False)[1])
+    assert found == approx(alone.evaluate(u, jacobian=False)[1], abs=1e-5)
 
 
 def test_a_recording_fitted_to_its_own_window_is_corrected_there():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,7 +67,7 @@ class LocalFit:
         return np.asarray(smooth), float(np.mean(weights[np.arange(len(times)), np.arange(len(times)) - first]))
 
 
-def steadiest(times: Array, positions: Array, width: float) -> LocalFit | None:
+def steadiest(times: Array, positions: Array, width: float, wider: Sequence[float] = WIDER) -> LocalFit | None:
     """How positions are best smoothed, over `width` s or more: what is smoothest where they are noise beside a slow
     motion, and no more than `width` where they are not. Decided by generalized cross-validation (Craven & Wahba 1979).
 
@@ -74,6 +75,7 @@ def steadiest(times: Array, positions: Array, width: float) -> LocalFit | None:
         times: (frames,) s, increasing.
         positions: (frames, ...) finite.
         width: s.
+        wider: times `width`, ascending, what else is tried.
 
     Returns:
         None where `width` holds too few frames to smooth over.
@@ -82,7 +84,7 @@ def steadiest(times: Array, positions: Array, width: float) -> LocalFit | None:
     best: LocalFit | None = None
     if not FEWEST <= narrow.frames(times) <= len(times):
         return None
-    for tried in (narrow, *(LocalFit(factor * width, 4) for factor in WIDER)):
+    for tried in (narrow, *(LocalFit(factor * width, 4) for factor in wider)):
         if tried.frames(times) > len(times):
             break
         smooth, own = tried.of(times, positions)

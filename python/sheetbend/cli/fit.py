@@ -12,6 +12,7 @@ import typer
 from rich.console import Console
 
 from ..config import Config, GrippedConfig, Study, build, parse_any
+from ..config.driven_motion import driven_files, save_driven, with_driven
 from ..config.values import with_values, write
 from ..errors import ConfigError
 from ..files.door import reading
@@ -185,7 +186,7 @@ def _place(config: Config | GrippedConfig, output: Path | None) -> Path:
 
 def _files(study: Study) -> list[str]:
     """What `_write` may leave behind."""
-    markers = predicted_files(e.name for e in study.experiments)
+    markers = [*predicted_files(e.name for e in study.experiments), *driven_files(study.experiments)]
     figures = figure_files(study.experiments, study.config)
     return ["fit.json", "report.txt", TABLE, PAGE, "fitted.toml", *markers, *figures]
 
@@ -260,10 +261,11 @@ def _write(found: Fit, study: Study, source: Path, form: str, page: bool, folder
     write_text(folder / TABLE, parameter_table(found.result))
     # a simulation of it runs on the mesh of the fit, where only these values predict what the report says
     on_mesh = with_values(study.config, {**found.values, **found.on_mesh})
-    write(on_mesh, folder / "fitted.toml", study.folder)
+    driven = save_driven(found, folder)
+    write(with_driven(study, on_mesh, driven, folder), folder / "fitted.toml", study.folder)
     pages = write_fit_page(found, study.config, source, folder) if page else []
     markers = [
         file for c in found.comparisons for file in save_predicted(c.recording, c.simulated, c.experiment.name, folder)
     ]
     figures = write_figures(found, study.config, form, folder)
-    return ["fit.json", "report.txt", TABLE, *pages, "fitted.toml", *markers, *figures]
+    return ["fit.json", "report.txt", TABLE, *pages, "fitted.toml", *driven.values(), *markers, *figures]

@@ -12,6 +12,7 @@ import typer
 from rich.console import Console
 
 from ..config import Study, load, scene_alone
+from ..config.driven_motion import as_simulated
 from ..errors import ConfigError
 from ..experiment.experiment import Experiment
 from ..experiment.force_readings import sensor_readings
@@ -129,7 +130,7 @@ def tasks_of(study: Study, duration: float | None, recording: str | None) -> lis
     Raises:
         ConfigError: the configuration has no recording of that name.
     """
-    experiments = [e for e in study.experiments if recording in (None, e.name)]
+    experiments = [e for e in as_simulated(study) if recording in (None, e.name)]
     if recording is not None and not experiments:
         known = ", ".join(e.name for e in study.experiments) or "none"
         raise ConfigError("--recording", "is not in the configuration", recording, f"name one of: {known}")

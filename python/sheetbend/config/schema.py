@@ -147,6 +147,11 @@ class RecordingSection(Section):
         "`sigma` must be right too",
         "m",
     )
+    driven_motion: str | None = key(
+        None,
+        "a file with the true motion of these markers, as `sheetbend fit` writes it beside its fitted.toml: "
+        "simulations follow it instead of the recorded motion. A fit estimates it anew",
+    )
     axes: str = key("xyz", "coordinates that count", pattern=AXES)
     radius: Finite | None = key(
         None,
@@ -180,6 +185,12 @@ class RecordingSection(Section):
     values: dict[str, Finite] = key(
         {}, "quantities whose value is known to differ here; for private parameters the initial value"
     )
+
+    @model_validator(mode="after")
+    def _estimated_by_a_fit(self) -> Self:
+        if self.driven_motion is not None and self.driven_sigma is None:
+            raise ValueError("has driven_motion without driven_sigma|give the noise of the driven markers, or drop it")
+        return self
 
 
 class ParameterSection(Section):

@@ -55,7 +55,7 @@ def write(config: Config, path: Path, folder: Path) -> None:
     tools = content["scene"].get("tool", [])
     recordings = content.get("recording", [])
     with_files = [(table, "file") for table in (*recordings, *meshes, *tools) if "file" in table]
-    with_files += [(table, "cloud") for table in recordings if "cloud" in table]
+    with_files += [(table, key) for table in recordings for key in ("cloud", "driven_motion") if key in table]
     with_files += [(r["tools"], name) for r in content.get("recording", []) for name in r.get("tools", {})]
     for table, at in with_files:
         table[at] = Path(os.path.relpath(folder / table[at], path.parent)).as_posix()

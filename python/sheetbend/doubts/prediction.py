@@ -10,6 +10,7 @@ import numpy as np
 from ..arrays.timeseries import mean_position
 from ..errors import RecordingError
 from ..experiment.carried import carried_baselines
+from ..experiment.driven_motion import continued
 from ..experiment.experiment import Experiment
 from ..minimum.optimizers import refit
 from ..minimum.problem import FitProblem
@@ -149,11 +150,12 @@ def compare(
         parameters: as given to the fit (private ones not expanded).
         values: by expanded name.
         corrected: by experiment, what the fit added to driven markers (`FitProblem.corrections`). Behind the fitted
-            part they move as recorded: a correction is as white as the noise, so it ends in no larger step than the
-            recorded motion makes from any frame to the next.
+            part they move as recorded, but smoothed (`estimated_motion`).
     """
     parts = [_whole(e) for e in experiments]
-    problem = FitProblem(experiments, parameters, [part for part, _ in parts], threads, corrected=corrected or {})
+    found = corrected or {}
+    moved = {e.name: continued(e, found[e.name]) for e in experiments if e.name in found}
+    problem = FitProblem(experiments, parameters, [part for part, _ in parts], threads, corrected=moved)
     u = problem.parameters.to_internal(values)
     known = {e.name: problem.values_of(e, u) for e in experiments}
     comparisons = []

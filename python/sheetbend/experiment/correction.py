@@ -69,6 +69,13 @@ class Correction:
         """(knots, markers, 3)."""
         return self.knots, len(self.markers), 3
 
+    def added(self, values: Array, numbers: Array) -> Array:
+        """The array "boundary" (knots, driven, 3) m with numbers (knots, markers, 3) m added to the markers."""
+        moved = np.array(values)
+        by = self.weight * np.repeat(numbers.ravel(), np.diff(self.first))
+        np.add.at(moved.reshape(-1), self.target, by)
+        return moved
+
     def core(self, offset: int, sigma: float, given: Array | None) -> dict[str, Any]:
         """For the compiled core.
 

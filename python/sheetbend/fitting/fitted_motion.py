@@ -8,6 +8,7 @@ import numpy as np
 
 from ..arrays.timeseries import Array
 from ..doubts.prediction import Comparison
+from ..experiment.driven_motion import corrected
 from ..motion.equilibrium import equilibrium
 from ..motion.simulate import simulate
 from .fit import Fit
@@ -24,6 +25,8 @@ def fitted_positions(found: Fit, c: Comparison, frames: Sequence[int] | slice = 
         DivergenceError: the motion diverges at the fitted values.
     """
     e, values = c.experiment, found.values_of(c.experiment)
+    if e.name in found.corrections:
+        e = corrected(e, found.corrections[e.name])
     if e.static:
         return equilibrium(e.scene, values=values).nodes[None]
     at = np.maximum(e.scene_times(c.recording.times[frames], values), 0.0)

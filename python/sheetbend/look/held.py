@@ -31,6 +31,7 @@ class Held:
         rope: keys of the rope.
         grips: tables of its grips.
         angles: ends whose clamps may turn by an angle that is fitted.
+        alone: names of markers that move an end, which turns there.
         lead: m, from what holds the rope to the marker next to it.
         priors: standard deviations of the rope's quantities that say how a hand holds it; zero is expected.
         notes, unknown: sentences about what is seen, and what is not known.
@@ -40,6 +41,7 @@ class Held:
     rope: dict[str, Any] = field(default_factory=dict)
     grips: list[dict[str, Any]] = field(default_factory=list)
     angles: list[str] = field(default_factory=list)
+    alone: list[str] = field(default_factory=list)
     lead: float = 0.0
     priors: dict[str, float] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
@@ -121,11 +123,8 @@ def held(s: Seen, hand: tuple[int, ...], order: tuple[int, ...]) -> Held:
                     f"{names[k]} moves the rope, which keeps its direction there: the hand does not turn"
                 )
             else:
+                found.alone.append(names[k])
                 found.notes.append(f"{names[k]} moves the rope, which turns there")
-                found.unknown.append(
-                    f"the true motion of {names[k]}: its noise shakes the rope, which looks like damping. It is "
-                    "smoothed; `smoothing = 0` with `driven_sigma` in [[recording]] estimates it, which takes longer"
-                )
                 found.unknown.append(
                     f"whether the hand turns the rope at {names[k]}: one marker gives no direction, so the end turns "
                     "freely. If it is gripped firmly, record a second marker in the hand, and name both in `markers`"

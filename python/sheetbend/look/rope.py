@@ -28,6 +28,8 @@ CLAMP_SD = 0.2  # rad, of the direction of a clamp, read off the first markers
 LENGTH_SD = 0.01  # relative, of a length that is a sum of distances between markers
 SET_MODES, SET_SD = (1, 2, 3, 4), 10.0  # of the rest curvature of shapes at rest; 1/m, that of mode k over k^1.5
 ROUND = 0.75  # GJ/EI of a round solid section with a Poisson ratio of 1/3
+LEAST_SIGMA = 1e-4  # m, of the markers of a motion: a model misses by as much
+NUMBERS = 1500  # of a hand's motion, three for every fitted frame: so many are estimated in minutes
 HOLDER_SD = 0.5  # rad, of a clamp of a shape at rest, read off the markers of the same shape
 
 TWIST = (
@@ -78,6 +80,9 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     in_space = not s.static and plane(r.positions[:, list(order)], length) is None
     kind = "rod" if in_space and _can_be_rod(s, found) else "rope"
     unknown = [said_length, said_density, *found.unknown, *([] if flat is None else [UNLOADED])]
+    estimated = kind == "rod" and _estimates_hand(takes, found)
+    if found.alone:
+        unknown.append(_true_motion(found, estimated))
     if in_space:
         unknown.append(TWIST if kind == "rod" else WITHOUT_TWIST)
     # beside a hand that holds its direction a rope bends within a few hundredths of its length
@@ -107,10 +112,12 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         f"[scene.{kind}.markers]  # arc lengths in m", dict(zip((names[k] for k in found.order), arc, strict=True))
     )
     for grip in found.grips:
-        lines += table(f"[[scene.{kind}.grip]]", grip)
+        lines += table(f"[[scene.{kind}.grip]]", grip | ({"smoothing": 0.0} if estimated else {}))
     for take in takes:
-        own = _recording(take, flat, "points" in rope) | {"max_gap": _max_gap(take, found)}
+        own = _recording(take, flat, "points" in rope) | {"driven_sigma": "estimate" if estimated else None}
+        own["max_gap"] = _max_gap(take, found)
         why = {
+            "driven_sigma": "the fit estimates the hand's true motion",
             "held_out": "predicted, not fitted",
             "max_gap": "s, for which a marker of a grip is lost: closed by a cubic",
         }
@@ -201,6 +208,27 @@ def _density(s: Seen, measured: Measured) -> tuple[float, str]:
     )
 
 
+def _estimates_hand(takes: Sequence[Take], found: Held) -> bool:
+    """Whether the fit is to estimate the true motion of what moves the rope, from one marker at each end: where the
+    noise of the markers is what the fit will leave, and where that takes minutes."""
+    markers = [name for grip in found.grips for name in grip["markers"]]
+    frames = sum(int(np.sum(take.seen.recording.times < _last_fitted(take))) for take in takes)
+    noisy = all(take.seen.noise > LEAST_SIGMA for take in takes)
+    return noisy and bool(markers) and markers == found.alone and 3 * len(markers) * frames <= NUMBERS
+
+
+def _true_motion(found: Held, estimated: bool) -> str:
+    what = f"the true motion of {joined(found.alone)}: its noise shakes the rope, which looks like damping. "
+    if estimated:
+        return what + (
+            "The fit estimates it (`driven_sigma`), which takes minutes. `smoothing = 0.12` in the grip instead of "
+            "`driven_sigma` in [[recording]] takes an eighth of the time, and the damping is known half as well"
+        )
+    return what + (
+        "It is smoothed; `smoothing = 0` with `driven_sigma` in [[recording]] estimates it, which takes longer"
+    )
+
+
 def _turns_freely(found: Held) -> bool:
     """Whether nothing holds a direction of the rope."""
     clamped = "clamp_start" in found.rope or "clamp_end" in found.rope
@@ -287,13 +315,19 @@ def _recording(take: Take, flat: list[float] | None, finds_rest: bool) -> dict[s
     if s.static:
         axes = "".join(axis for k, axis in enumerate("xyz") if flat is None or abs(flat[k]) < 0.99)
         return entries | {"static": True, "sigma": max(s.noise, 0.007 * float(np.nanmax(s.apart))), "axes": axes}
-    start, stop = float(r.times[0]), float(r.times[-1])
+    start, stop, last = float(r.times[0]), float(r.times[-1]), _last_fitted(take)
     if s.rest and finds_rest:
         entries["start"] = "equilibrium"
-    last = round(start + s.rest + min(FITTED * (stop - start - s.rest), LONGEST), 4)
     entries["fit"] = [start, last]
     entries["held_out"] = [last, round(min(stop, last + 0.5 * (last - start)), 4) + 1e-3]
-    return entries | {"sigma": max(s.noise, 1e-4)}
+    return entries | {"sigma": max(s.noise, LEAST_SIGMA)}
+
+
+def _last_fitted(take: Take) -> float:
+    """The end of the part of a motion that is fitted, s."""
+    s, times = take.seen, take.seen.recording.times
+    start, stop = float(times[0]), float(times[-1])
+    return round(start + s.rest + min(FITTED * (stop - start - s.rest), LONGEST), 4)
 
 
 def _max_gap(take: Take, found: Held) -> float | None:

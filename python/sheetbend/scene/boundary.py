@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -125,6 +126,12 @@ class Boundary:
             places = knots + 3 * slots[:, None] + axes
             found.append(Term("boundary", places.ravel(), values[..., axes].ravel(), tuple(factors.items())))
         return found
+
+    def moved(self, values: Array) -> Boundary:
+        """The same with other plain motions (knots, driven, 3) m."""
+        made = copy.copy(self)
+        made._values = list(np.moveaxis(values, 1, 0))
+        return made
 
     @property
     def values(self) -> Array:
