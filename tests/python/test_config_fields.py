@@ -43,6 +43,8 @@ WHOLE: dict[str, Any] = {
                 "law": {"kind": "exponential", "warp": 10.0, "weft": 10.0, "shear": 5.0},
                 "set": [{"name": "clips", "points": [[0, 0, 0]]}],
                 "grip": [{"set": "left", "markers": ["m0"]}],
+                "bar": [{"set": "left", "marker": "m0", "direction": [0, 1, 0]}],
+                "shape": "recording",
                 "grid": {"first": [0, 0], "last": [0.1, 0.1], "counts": [2, 2]},
             }
         ],

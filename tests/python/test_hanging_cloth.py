@@ -117,6 +117,48 @@ def test_the_cloth_starts_through_its_markers(folder: Path) -> None:
     assert finer.scene.positions[finer.scene.cloths["cloth"].particles[-1]] == pytest.approx(hanging(CORNERS)[1])
 
 
+BAR = """[[scene.cloth.bar]]
+set = "bottom"
+marker = "Unlabeled 12"
+direction = [2, 0, 0.5]
+
+[[scene.cloth.set]]
+name = "left_hand"
+"""
+
+
+def test_a_side_starts_on_a_straight_bar(folder: Path) -> None:
+    """One marker of the bar shows where all of the side is; what the other markers show of the cloth stays."""
+    (e,) = load(configured(folder, ('[[scene.cloth.set]]\nname = "left_hand"\n', BAR))).experiments
+    cloth = e.scene.cloths["cloth"]
+    x = e.scene.positions[cloth.particles[cloth.mesh.sets["bottom"]]]
+    along = (x - [0.3, 1.6, 0.4]) @ [2, 0, 0.5] / np.hypot(2, 0.5)
+    assert x == pytest.approx([0.3, 1.6, 0.4] + np.outer(along, [2, 0, 0.5]) / np.hypot(2, 0.5), abs=1e-9)
+    assert along == pytest.approx(along[0] + np.linspace(0, WIDTH, 9) * 2 / np.hypot(2, 0.5))
+    hands = cloth.particles[[cloth.mesh.sets[f"{side}_hand"][0] for side in ("left", "right")]]
+    assert e.scene.positions[hands] == pytest.approx(hanging(CORNERS), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("[2, 0, 0.5]", "[0, 0, 0]", r"direction.*no length"),
+        ('"bottom"', '"rim"', r"bar\[0\]\.set.*rim.*left, right"),
+        ('"Unlabeled 12"', '"Unlabeled 99"', r"bar\[0\]\.marker.*Unlabeled 99"),
+    ],
+)
+def test_a_bar_that_is_none_is_refused(folder: Path, old: str, new: str, said: str) -> None:
+    bar = BAR.replace(old, new)
+    with pytest.raises(ConfigError, match=f"(?s){said}"):
+        load(configured(folder, ('[[scene.cloth.set]]\nname = "left_hand"\n', bar)))
+
+
+def test_a_bar_wants_a_shape_from_the_recording(folder: Path) -> None:
+    edits = (('[[scene.cloth.set]]\nname = "left_hand"\n', BAR), ('shape = "recording"\n', ""))
+    with pytest.raises(ConfigError, match=r'(?s)sides on bars.*shape = "recording"'):
+        load(configured(folder, *edits))
+
+
 def held_apart(share: float) -> tuple[sb.Scene, np.ndarray]:
     """A sheet hung from two corners, `share` of its width apart; its particles in a plane and in a bulge."""
     mesh = sb.mesh.grid(0.5, 0.4, 12, 10, pattern="one_way")

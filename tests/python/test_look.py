@@ -216,27 +216,46 @@ def test_a_cloth_is_held_where_its_upper_row_does_not_sag(tmp_path: Path, named:
 
 
 def test_several_cloths_of_one_recording(tmp_path: Path) -> None:
-    """Hammocks between bars, one of them with a marker of each bar at its ends, and a flap over a rod, whose halves
-    hang from what is seen of them."""
+    """Hammocks between two bars with a marker each, which all of them share, however far along the bars they are: two
+    of the three were moved by their own outer rows. A flap over a rod, whose halves were taken for two cloths that
+    swing from their upper rows, is left out: no marker shows how the fabric runs over the rod."""
     recording = ROOT / "experiments/twin_cloth/data/swinging.npz"
-    said = last_line(run("new", recording, "--output", tmp_path / "draft.toml", "--json"))
-    first, *named = tomllib.loads((tmp_path / "draft.toml").read_text())["scene"]["cloth"]
+    path = tmp_path / "draft.toml"
+    said = last_line(run("new", recording, "--output", path, "--json"))
+    draft = tomllib.loads(path.read_text())
+    first, *named = draft["scene"]["cloth"]
     cloths = {cloth["name"]: cloth for cloth in named}
-    assert said["kind"] == "5 cloths" and list(cloths) == ["weft_cut", "bias_cut", "cloth_4", "cloth_5"]
-    assert first["mesh"]["width"] == approx(0.4, rel=4e-3)  # the bars' markers are at its ends
-    assert first["markers"]["left"][0] in (0.0, first["mesh"]["width"])
+    assert said["kind"] == "3 cloths" and list(cloths) == ["weft_cut", "bias_cut"]
+    (scene,) = (e.scene for e in config.build(config.parse_any(path), tmp_path).experiments)
+    for cloth in (first, *named):
+        assert cloth["mesh"]["width"] == approx(0.4, rel=2e-3)  # as long as the way from bar to bar, without tension
+        assert sorted(grip["markers"] for grip in cloth["grip"]) == [["left"], ["right"]]
+        made = scene.cloths[cloth.get("name", "cloth")]
+        for grip in cloth["grip"]:
+            edge = scene.positions[made.particles[made.mesh.sets[grip["set"]]]]
+            # the true bars are level; an edge was up to 4.9 mm lower at the end that no marker shows
+            assert np.abs(edge[:, [0, 2]] - [0.4 * (grip["markers"] == ["right"]), 0.0]).max() < 0.6e-3
     # without tension, as the lengths of the hammocks say: 2.5 % longer where it is stretched most
-    density = first["density"]
     for cloth, stiffness in ((first, 100.0), (cloths["weft_cut"], 60.0)):  # N/m at 0.2 kg/m^2
-        spread = np.ptp([at[0] for name, at in cloth["markers"].items() if name not in ("left", "right")])
+        spread = np.ptp([at[0] for at in cloth["markers"].values()])
         assert spread == approx(0.8 / 3.0, rel=4e-3)
-        assert cloth["warp"] / density == approx(stiffness / 0.2, rel=0.25)
-    assert sorted(grip["markers"] for grip in first["grip"]) == [["left"], ["right"]]
-    assert {grip["set"] for grip in cloths["weft_cut"]["grip"]} == {"left", "right"}
-    assert {m.rstrip("0123456789") for n in ("cloth_4", "cloth_5") for m in cloths[n]["markers"]} == {"flap_"}
-    assert [grip["set"] for n in ("cloth_4", "cloth_5") for grip in cloths[n]["grip"]] == ["top", "top"]
-    assert "weft_cut_warp" in said["parameters"] and "cloth_4_warp" not in said["parameters"]
-    assert any("length of the flat fabric" in words for words in said["unknown"])
+        assert cloth["warp"] / cloth["density"] == approx(stiffness / 0.2, rel=0.25)
+    assert "weft_cut_warp" in said["parameters"] and "weft_cut_bending" not in said["parameters"]
+    assert draft["given"]["cloth_density"] == {"sd": 0.5} and draft["given"]["bias_cut_membrane_damping"] == {"sd": 0.5}
+    told = " ".join(said["unknown"])
+    assert "what flap_0" in told and "lie over" in told and "length of the flat fabric" in told
+
+
+@pytest.mark.slow
+def test_a_draft_of_hammocks_comes_to_their_truth(tmp_path: Path) -> None:
+    """The draft had a warp of 140 N/m where 100 is true, "identified", and a held-out error of 5.99 mm, against 0.40 mm
+    of the shipped configuration."""
+    fit = fitted(tmp_path, "twin_cloth/data/swinging.npz", "--density", "0.2")
+    bias = 4.0 / (1.0 / 100.0 + 1.0 / 60.0 + 1.0 / 20.0 - 2.0 * 0.3 / np.sqrt(6000.0))  # of a strip at 45 degrees
+    for name, true in {"cloth_warp": 100.0, "weft_cut_warp": 60.0, "bias_cut_warp": bias}.items():
+        assert fit[name].lower < true < fit[name].upper, name
+        assert fit[name].upper < 1.2 * fit[name].lower, name
+    assert fit.recordings[0].held_out < 1.2 * 0.40e-3
 
 
 @pytest.mark.parametrize("name", ["cloth_in_wind", "held_cloth"])

@@ -115,6 +115,22 @@ class Grip(Section):
         return self
 
 
+class Bar(Section):
+    """A straight bar that holds a side of a cloth, for `shape = "recording"`. A list: [[scene.cloth.bar]]; the side
+    starts on the line through the marker, also where no other marker shows how it lies. A grip moves it."""
+
+    set: Name = key(..., "a set of the mesh's own vertices, such as left or right of a grid")
+    marker: str | int = key(..., "on the bar, anywhere along it")
+    direction: Vector = key(..., "of the bar")
+
+    @field_validator("direction")
+    @classmethod
+    def _has_length(cls, direction: list[float]) -> list[float]:
+        if not any(direction):
+            raise ValueError("has no length|give where the bar points")
+        return direction
+
+
 class MarkerGrid(Section):
     """[scene.cloth.grid], [recording.grids.NAME]: markers on an even grid of a cloth, rows along the warp one after
     another."""
@@ -222,6 +238,7 @@ class Cloth(Section):
     set: list[VertexSet] = key([], "further sets of vertices")
     pinned: list[Name] = key([], "sets that are held where they are placed")
     grip: list[Grip] = key([], "sets that are moved with markers or a tool")
+    bar: list[Bar] = key([], "sides that lie on straight bars at the start")
     markers: dict[str, Pair] | Literal["vertices"] = key(
         {},
         'material coordinates (along warp and weft) of markers, by name; or "vertices" of a mesh from a file: markers '
@@ -273,6 +290,12 @@ class Cloth(Section):
             fix = "leave it out, or leave out scene.cloth.volume, which finds the pressure that it takes"
             raise ValueError(f"stands beside a volume that is kept, and one takes up the other|{fix}")
         return pressure
+
+    @model_validator(mode="after")
+    def _bars_beside_a_recorded_shape(self) -> Self:
+        if self.bar and self.shape == "placed":
+            raise ValueError('has sides on bars and starts as placed|give shape = "recording", or leave out bar')
+        return self
 
     @property
     def in_air(self) -> bool:

@@ -14,6 +14,7 @@ from ..errors import ConfigError
 from ..mesh import Places, TriangleMesh
 from ..mesh.places import nearest
 from ..mesh.subdivide import subdivided
+from ..mesh.through import through
 from ..objects.cloth import Cloth, add_cloth
 from ..objects.laws import COMPONENTS, Exponential, Law, Sinh, Spline
 from ..objects.tool import Tool
@@ -25,7 +26,7 @@ from .tools import tool_named
 
 _ELSEWHERE = {
     *("name", "mesh", "law", "origin", "x_axis", "y_axis", "on_tool", "set", "pinned", "grip"),
-    *("markers", "grid", "nearest_at", "layout", "shape"),
+    *("bar", "markers", "grid", "nearest_at", "layout", "shape"),
     *("air_normal", "air_tangential", "pressure", "volume"),
 }
 """Keys of a cloth that are not arguments of `add_cloth`, or not as they stand."""
@@ -51,7 +52,7 @@ def build_cloth(
     Raises:
         ConfigError: anything inconsistent, with the path of the key.
     """
-    shape = mesh.vertices if section.shape == "placed" else _recorded(f"{path}.shape", mesh, seated, moment)
+    shape = mesh.vertices if section.shape == "placed" else _recorded(path, section, mesh, seated, moment)
     for i, chosen in enumerate(section.set):
         mesh = _with_set(f"{path}.set[{i}]", mesh, shape, chosen, moment)
     pinned = [_members(f"{path}.pinned", mesh, name) for name in section.pinned]
@@ -97,21 +98,35 @@ def placed_mesh(path: str, section: schema.Cloth, folder: Path, finer: int, tool
     return replace(mesh, vertices=placed)
 
 
-def _recorded(path: str, mesh: TriangleMesh, seated: Mapping[str, Places], moment: Moment | None) -> np.ndarray:
-    """(vertices, 3) m, smoothly through the markers on a mesh at the start."""
+def _recorded(
+    path: str, section: schema.Cloth, mesh: TriangleMesh, seated: Mapping[str, Places], moment: Moment | None
+) -> np.ndarray:
+    """(vertices, 3) m, smoothly through the markers on a mesh at the start, and through bars that hold its sides."""
+    where = f"{path}.shape"
     if moment is None:
-        raise ConfigError(path, "needs a recording", "recording", "add a [[recording]], or leave the key out")
+        raise ConfigError(where, "needs a recording", "recording", "add a [[recording]], or leave the key out")
     if not seated:
         fix = "give markers, or nearest_at"
-        raise ConfigError(path, "needs markers on the cloth", "none", fix)
+        raise ConfigError(where, "needs markers on the cloth", "none", fix)
     number = {marker: k for k, marker in enumerate(moment.recording.markers)}
     order = [number[marker] for marker in seated]
     fields = [np.concatenate([getattr(p, f) for p in seated.values()]) for f in ("triangles", "vertices", "weights")]
     places, shape = Places(*fields), moment.shape[order]
     if np.array_equal(places.positions(mesh.vertices), mesh.vertices) and not np.isnan(shape).any():
         return shape  # a marker on every vertex
-    with located(path):
-        return mesh.through(places, shape)
+    at, to = [places.positions(mesh.vertices)], [shape]
+    for i, bar in enumerate(section.bar):
+        held = mesh.vertices[_members(f"{path}.bar[{i}].set", mesh, bar.set)]
+        at, to = [*at, held], [*to, _on_bar(f"{path}.bar[{i}]", bar, held, moment)]
+    with located(where):
+        return through(mesh.vertices, np.concatenate(at), np.concatenate(to))
+
+
+def _on_bar(path: str, bar: schema.Bar, placed: np.ndarray, moment: Moment) -> np.ndarray:
+    """(vertices, 3) m, the points of a bar nearest to where its vertices are placed."""
+    (marker,) = _seen(f"{path}.marker", [bar.marker], moment)
+    along = np.array(bar.direction) / np.linalg.norm(bar.direction)
+    return np.asarray(marker + np.outer((placed - marker) @ along, along))
 
 
 def _press(scene: Scene, section: schema.Cloth, cloth: Cloth) -> None:

@@ -39,6 +39,7 @@ HEADERS: dict[str, type[Section]] = {
     "[scene.cloth.volume]": cloth_schema.ClothVolume,
     "[[scene.cloth.set]]": cloth_schema.VertexSet,
     "[[scene.cloth.grip]]": cloth_schema.Grip,
+    "[[scene.cloth.bar]]": cloth_schema.Bar,
     "[scene.cloth.grid], [recording.grids.NAME]": cloth_schema.MarkerGrid,
     "[[scene.solid]]": solid_schema.SolidSection,
     "[[scene.solid.set]]": solid_schema.SolidSet,

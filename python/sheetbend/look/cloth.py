@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import RecordingError
 from .cloth_held import SAGS, SIDES, Hold, holds, row_of, slung
 from .cloth_parts import cloth_parts
+from .folded import folded
 from .seen import Seen
 from .sheet import flattened, placed, spacing
 from .slung import Slack, slack
@@ -24,6 +25,7 @@ WARP, SHEAR = 500.0, 100.0  # N/m per kg/m^2, to start from
 ASKEW = 0.15  # slope at which a cloth hangs that a wind blows on
 AIR = 0.7  # kg/m^3, of a plate across the wind: half the density of air times a drag coefficient of 1.2
 SUBSTEP = 1 / 250  # s, at most
+GUESS = 0.5  # standard deviation of what is assumed without a measurement, relative
 SIZE = 0.01  # standard deviation of the flat size that markers on a stretched cloth show, relative
 FITTED, LONGEST = 2 / 3, 3.0  # share of the time that is fitted, and s at most
 
@@ -77,15 +79,21 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
             "configuration by hand",
         )
     sheets, notes, unknown = [], list[str](), list[str]()
+    first = (_looked_at(s, name, own, others, density, {}) for name, own in cloths.items())
+    bars = _bars([sheet for sheet in first if sheet is not None])
     for name, own in cloths.items():
-        sheet = _looked_at(s, name, own, others, density)
+        sheet = _looked_at(s, name, own, others, density, bars)
         if sheet is None:
-            unknown.append(
-                f"what {joined(names[k] for k in own)} lie over: the middle of their cloth is above two of its sides, "
-                "and no marker shows how the fabric runs there. They are left out; write this cloth by hand"
-            )
+            unknown.append(_lies_over(names, own, "the middle of their cloth is above two of its sides"))
             continue
         sheets.append(sheet)
+    pairs = folded(s, [(sheet.own, sheet.flat) for sheet in sheets])
+    sides = {k for pair in pairs for k in pair}
+    for pair in pairs:
+        own = sorted(sheets[pair[0]].own + sheets[pair[1]].own)
+        unknown.append(_lies_over(names, own, "they hang from two rows that face each other, on either side of it"))
+    sheets = [sheet for k, sheet in enumerate(sheets) if k not in sides]
+    for sheet in sheets:
         notes += _seen_of(s, sheet, len(cloths) > 1)
     if not sheets:
         fix = "measure the fabric between the markers and write the configuration by hand, see docs/configuration.md"
@@ -96,7 +104,25 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     if unused:
         unknown.append(f"what the markers {joined(names[k] for k in unused)} are attached to: they are left out")
     kind = ("a cloth" if len(sheets) == 1 else f"{len(sheets)} cloths") + (" at rest" if s.static else "")
-    return Description(kind, notes, unknown, _lines(takes, sheets, density))
+    return Description(kind, notes, unknown, _lines(takes, sheets, density, measured))
+
+
+def _bars(sheets: Sequence[Sheet]) -> dict[int, tuple[float, ...]]:
+    """Directions of bars by their markers, the median of what the rows beside them show: a row may be tilted, as that
+    of a fabric cut on the bias is, and this counts by its distance from the marker."""
+    shown: dict[int, list[Array]] = {}
+    for hold in (hold for sheet in sheets for hold in sheet.held):
+        if hold.bar is not None:
+            bar, rows = np.array(hold.bar), shown.setdefault(hold.markers[0], [])
+            rows.append(bar * (np.sign(bar @ rows[0]) if rows else 1.0))
+    return {k: tuple(np.median(rows, axis=0).tolist()) for k, rows in shown.items()}
+
+
+def _lies_over(names: Sequence[str], own: Sequence[int], because: str) -> str:
+    return (
+        f"what {joined(names[k] for k in own)} lie over: {because}, and no marker shows how the fabric runs there. "
+        "They are left out; write this cloth by hand, as experiments/twin_cloth does"
+    )
 
 
 def _seen_of(s: Seen, sheet: Sheet, several: bool) -> list[str]:
@@ -162,9 +188,9 @@ def _unknown(s: Seen, sheets: Sequence[Sheet], measured: Measured) -> list[str]:
         )
     elif any(sheet.slung for sheet in sheets):
         said.append(
-            "the stiffness across and in shear: a slung cloth shows that along its length, which is fitted as "
-            "`..._warp`, whichever way the threads run. It is only as good as the length of the flat fabric: in one "
-            "example 0.2 % too long, and 40 % too stiff"
+            "the stiffness across, in shear and in bending: a slung cloth shows that along its length, which is fitted "
+            "as `..._warp`, whichever way the threads run. It is only as good as the length of the flat fabric, which "
+            "is fitted beside it: an error of 0.2 % is one of 15 to 40 % of the stiffness"
         )
     if not windy and not all(sheet.slung for sheet in sheets):
         said.append("the stiffness in tension: a hanging cloth hardly shows it. warp and shear are not fitted")
@@ -175,7 +201,8 @@ def _unknown(s: Seen, sheets: Sequence[Sheet], measured: Measured) -> list[str]:
         else "the wind: the air is taken to stand still, and `air_tangential`, its friction along the cloth, is a guess"
     )
     said.append(
-        "the density: 0.2 kg/m^2 is assumed, and all other values are proportional to it"
+        "the density: 0.2 kg/m^2 is assumed, and all other values are proportional to it. The intervals allow for 50 % "
+        "of it (`[given]`): measure it, and give --density"
         if measured.density is None
         else "the mass of the markers"
     )
@@ -189,8 +216,10 @@ def _unknown(s: Seen, sheets: Sequence[Sheet], measured: Measured) -> list[str]:
     return said
 
 
-def _looked_at(s: Seen, name: str, own: list[int], others: Sequence[int], density: float) -> Sheet | None:
-    """A cloth; None where something lies under it."""
+def _looked_at(
+    s: Seen, name: str, own: list[int], others: Sequence[int], density: float, bars: Mapping[int, tuple[float, ...]]
+) -> Sheet | None:
+    """A cloth; None where something lies under it. Bars point where its rows beside them do, if not given."""
     r = s.recording
     flat = flattened(s.apart[np.ix_(own, own)])
     start = int(np.argmax(r.mask[:, own].sum(axis=1)))
@@ -208,7 +237,7 @@ def _looked_at(s: Seen, name: str, own: list[int], others: Sequence[int], densit
     found = slack(s, own, flat, apart) if is_slung else None
     if found is not None:
         flat = flat * [found.length / np.ptp(flat[:, 0]), 1.0]
-    held = holds(s, own, flat, others, ("left", "right") if is_slung else ("top",))
+    held = holds(s, own, flat, others, ("left", "right") if is_slung else ("top",), bars)
     beyond = {hold.side: hold.beyond for hold in held}
     if found is not None:  # the cloth is stretched there too
         beyond |= {side: beyond[side] * found.length / found.first for side in ("left", "right") if side in beyond}
@@ -234,7 +263,7 @@ def _wind(s: Seen, own: list[int], row: list[int], up: Array, density: float) ->
     return np.asarray(speed * across / np.linalg.norm(across))
 
 
-def _lines(takes: Sequence[Take], sheets: Sequence[Sheet], density: float) -> list[str]:
+def _lines(takes: Sequence[Take], sheets: Sequence[Sheet], density: float, measured: Measured) -> list[str]:
     s, r = takes[0].seen, takes[0].seen.recording
     lines = [] if r.gravity is not None else table("[scene]", {"gravity": s.gravity.tolist()})
     solver: dict[str, Any] = {"method": "newton"}
@@ -250,7 +279,7 @@ def _lines(takes: Sequence[Take], sheets: Sequence[Sheet], density: float) -> li
     for take in takes:
         lines += table("[[recording]]", _recording(take))
     for sheet in sheets:
-        lines += _parameters(sheet, density, s.static)
+        lines += _parameters(sheet, density, s.static) + _guesses(sheet, measured, s.static)
     if winds:
         for k in np.flatnonzero(np.arange(3) != s.up):
             lines += table(f"[parameters.wind_{'xyz'[k]}]", {"lower": -20.0, "upper": 20.0})
@@ -277,6 +306,10 @@ def _cloth(s: Seen, sheet: Sheet, density: float) -> list[str]:
     cells = [max(2, round(CELLS * side / max(sheet.width, sheet.height))) for side in (sheet.width, sheet.height)]
     mesh = {"kind": "grid", "width": sheet.width, "height": sheet.height, "nx": cells[0], "ny": cells[1]}
     lines += table("[scene.cloth.mesh]", mesh)
+    for hold in sheet.held:
+        if hold.bar is not None and cloth["shape"] is not None:
+            bar = {"set": hold.side, "marker": names[hold.markers[0]], "direction": list(hold.bar)}
+            lines += table("[[scene.cloth.bar]]", bar, {"direction": "that of the row of markers beside it"})
     for given in sets:
         lines += table("[[scene.cloth.set]]", given)
     for grip in grips:
@@ -292,7 +325,7 @@ def _at_edge(sheet: Sheet, hold: Hold) -> list[tuple[int, list[float]]]:
     axis, sign = SIDES[hold.side]
     size = (sheet.width, sheet.height)
     found = []
-    for k, along in zip(hold.markers, hold.along, strict=False):
+    for k, along in zip(hold.markers, hold.along, strict=False) if hold.bar is None else ():
         at = along + sheet.low[1 - axis]
         if 0.0 <= at <= size[1 - axis]:
             here = size[axis] if sign > 0 else 0.0
@@ -300,8 +333,9 @@ def _at_edge(sheet: Sheet, hold: Hold) -> list[tuple[int, list[float]]]:
     return found
 
 
-def _parameters(sheet: Sheet, density: float, static: bool) -> list[str]:
-    found = {"bending": (1e-7 * density, 1.0 * density)}
+def _fitted(sheet: Sheet, density: float, static: bool) -> dict[str, tuple[float, float]]:
+    """Bounds of what is fitted of a cloth."""
+    found = {} if sheet.slung else {"bending": (1e-7 * density, 1.0 * density)}  # tension hides it on coarse cells
     # kept at a guess they draw the wind far off: on experiments/cloth_in_wind 9 mm in the place of 3
     tension = ("warp", "shear") if sheet.wind is not None else ("warp",) if sheet.slung else ()
     for name, guess in {"warp": WARP, "shear": SHEAR}.items():
@@ -311,11 +345,26 @@ def _parameters(sheet: Sheet, density: float, static: bool) -> list[str]:
         found["air_tangential"] = (1e-3, 1.0)
     if not static:
         found["air_normal"] = (0.02, 20.0)
+    return found
+
+
+def _parameters(sheet: Sheet, density: float, static: bool) -> list[str]:
     lines = []
-    for name, (lower, upper) in found.items():
+    for name, (lower, upper) in _fitted(sheet, density, static).items():
         lines += table(f"[parameters.{sheet.name}_{name}]", {"lower": lower, "upper": upper})
     for size in _sizes(sheet):
         lines += table(f"[parameters.{sheet.name}_{size}]", {"prior": [1.0, SIZE]}, {"prior": "mean and sd"})
+    return lines
+
+
+def _guesses(sheet: Sheet, measured: Measured, static: bool) -> list[str]:
+    """How far off the numbers may be that are assumed: they count in the intervals."""
+    guessed = ["warp", "shear", "bending", *([] if static else ["membrane_damping", "bend_damping", "air_tangential"])]
+    fitted = _fitted(sheet, 1.0, static)
+    names = ([] if measured.density is not None else ["density"]) + [name for name in guessed if name not in fitted]
+    lines = list[str]()
+    for name in names:
+        lines += table(f"[given.{sheet.name}_{name}]", {"sd": GUESS}, {"sd": "relative: a guess"})
     return lines
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,6 +34,7 @@ class Hold:
         beyond: m, from the outer row of markers to the side.
         own: whether these markers are the cloth's own.
         along: m, where they are along the side, in the coordinates of the markers' places; of a holder.
+        bar: (3,) direction of the side, where one marker of a holder alone shows where it is.
     """
 
     side: str
@@ -43,6 +44,7 @@ class Hold:
     beyond: float
     own: bool
     along: tuple[float, ...] = ()
+    bar: tuple[float, ...] | None = None
 
     def tables(self, names: Sequence[str], s: Seen) -> tuple[list[Any], list[Any], list[Any]]:
         """Sets that are pinned, sets, and grips of a cloth."""
@@ -82,7 +84,14 @@ def slung(x: Array, flat: Array, up: Array, apart: float) -> tuple[int, float]:
     return best
 
 
-def holds(s: Seen, own: Sequence[int], flat: Array, others: Sequence[int], sides: Sequence[str]) -> list[Hold]:
+def holds(
+    s: Seen,
+    own: Sequence[int],
+    flat: Array,
+    others: Sequence[int],
+    sides: Sequence[str],
+    bars: Mapping[int, tuple[float, ...]],
+) -> list[Hold]:
     """How a cloth is held: by the holder's markers that are near it, else by the outer rows of some sides.
 
     Args:
@@ -90,6 +99,7 @@ def holds(s: Seen, own: Sequence[int], flat: Array, others: Sequence[int], sides
         others: markers on no cloth.
         sides: where it is held if no marker of a holder is near; of two sides that such a marker is beyond, one of
             these counts.
+        bars: directions of bars by their markers, in place of that of the row beside each.
     """
     x, numbers = s.recording.positions, list(own)
     apart = spacing(s.apart[np.ix_(numbers, numbers)])
@@ -102,13 +112,17 @@ def holds(s: Seen, own: Sequence[int], flat: Array, others: Sequence[int], sides
         side, beyond = _side(flat, at, sides)
         if beyond > -0.5 * apart:
             by_side.setdefault(side, []).append((float(at[1 - SIDES[side][0]]), beyond, k))
+    if len(sides) > 1 and all(len(near) == 1 for near in by_side.values()):
+        by_side = _on_bars(s, numbers, flat, others, sides, bars) or by_side
     found = []
     for side, near in by_side.items():
         row = [numbers[k] for k in row_of(flat, side, apart)]
         along, _, markers = zip(*sorted(near), strict=True)
         beyond = max(0.0, float(np.mean([off for _, off, _ in near])))
         moves = motion(x[:, list(markers)]) >= QUIET * moved and not s.static
-        found.append(Hold(side, markers, _sags(x, row), moves, beyond, False, along))
+        sags = _sags(x, row)
+        bar = None if sags or len(near) > 1 else bars.get(markers[0], tuple(_direction(x, row).tolist()))
+        found.append(Hold(side, markers, sags, moves, beyond, False, along, bar))
     for side in () if found else sides:
         row = [numbers[k] for k in row_of(flat, side, apart)]
         moves = not s.static and motion(x[:, row]) >= QUIET * moved
@@ -116,6 +130,51 @@ def holds(s: Seen, own: Sequence[int], flat: Array, others: Sequence[int], sides
         beyond = 0.0 if moves or corners else 0.5 * apart
         found.append(Hold(side, (row[0], row[-1]) if corners else tuple(row), corners, moves, beyond, True))
     return found
+
+
+def _on_bars(
+    s: Seen,
+    own: list[int],
+    flat: Array,
+    others: Sequence[int],
+    sides: Sequence[str],
+    bars: Mapping[int, tuple[float, ...]],
+) -> dict[str, list[tuple[float, float, int]]]:
+    """By side, a marker on a straight bar that holds it: in line with the outer row, at a distance from it that hardly
+    changes, however far along. Only where each side has one of its own."""
+    x, t = s.recording.positions, s.recording.times
+    apart = spacing(s.apart[np.ix_(own, own)])
+    center = np.nanmean(x[:, own], axis=(0, 1))
+    found = dict[str, list[tuple[float, float, int]]]()
+    for side in sides:
+        row = row_of(flat, side, apart)
+        seen = x[:, [own[k] for k in row]]
+        if len(row) < 2 or _sags(x, [own[k] for k in row]):
+            continue
+        axis, sign = SIDES[side]
+        inset = float(np.max(sign * flat[:, axis]) - np.mean(sign * flat[row, axis]))
+        least = LOOSE
+        for k in others:
+            direction = np.array(bars.get(k, _direction(x, [own[j] for j in row])))
+            off = x[:, k] - seen.mean(axis=1)
+            along = off @ direction
+            distance = np.linalg.norm(off - along[:, None] * direction, axis=1)
+            far = float(np.nanmean(distance))
+            varies = float(np.nanstd(distance)) / max(far, apart)
+            outside = float(np.nanmean(off, axis=0) @ (np.nanmean(seen, axis=(0, 1)) - center)) > 0
+            if outside and far <= REACHES * apart and varies < least:
+                least = varies
+                first = distance[t <= t[0] + s.rest]
+                beyond = float(np.nanmean(first if np.isfinite(first).any() else distance)) - inset
+                found[side] = [(float(flat[:, 1 - axis].mean() + np.nanmean(along)), beyond, k)]
+    whole = len(found) == len(sides) == len({near[0][2] for near in found.values()})
+    return found if whole else {}
+
+
+def _direction(x: Array, row: list[int]) -> Array:
+    """(3,) unit direction of a row of markers, on average."""
+    ends = np.nanmean(x[:, row[-1]] - x[:, row[0]], axis=0)
+    return np.asarray(ends / np.linalg.norm(ends))
 
 
 def motion(x: Array) -> float:
