@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 import sheetbend as sb
+from sheetbend.doubts.touching import _refitted
 from sheetbend.minimum.approach import Approach
 from sheetbend.minimum.coordinates import Coordinates
 from sheetbend.minimum.optimizers import has_ceres, minimize
@@ -134,3 +135,14 @@ def test_body_at_the_limit_is_not_called_identified() -> None:
         assert found["box_spin_x"].verdict == "identified"
         assert ("box_inertia_3 = box_inertia_2 + 0.002" in found["box_inertia_2"].words) == (seed == 2)
     assert verdicts == [["at a bound"] * 2, ["identified"] * 2]
+
+
+def test_ends_of_an_interval_are_possible_bodies_too() -> None:
+    """The end of a linear interval may not be one; motions with contacts are run there."""
+    one = [experiment((2e-3, 2.5e-3, 3e-3))]
+    problem = FitProblem(one, as_parameters([*RATIOS, *OWN], one))
+    u = problem.parameters.initial()
+    end = _refitted(problem, u, problem.evaluate(u)[2], "box_inertia_3", 5.5e-3)
+    assert problem.evaluate(end, False)[0]
+    near = _refitted(problem, u, problem.evaluate(u)[2], "box_inertia_3", 3.0001e-3)
+    assert problem.parameters.to_physical(near)["box_inertia_3"] == pytest.approx(3.0001e-3, rel=1e-12)
