@@ -12,7 +12,8 @@ import pytest
 import sheetbend as sb
 from pytest import approx
 from sheetbend.errors import InputError, SheetbendError
-from sheetbend.minimum.approach import LOG_STEP, Approach, inside, step_limits
+from sheetbend.minimum.approach import Approach, inside
+from sheetbend.minimum.coordinates import LOG_STEP, step_limits
 from sheetbend.minimum.growth import Growth
 from sheetbend.minimum.optimizers import has_ceres, minimize
 from sheetbend.minimum.problem import FitProblem, as_parameters

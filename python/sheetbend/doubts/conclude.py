@@ -9,6 +9,7 @@ import numpy as np
 
 from ..arrays.timeseries import Array
 from ..minimum.growth import Growth
+from ..minimum.linear_step import gauss_newton
 from ..minimum.optimizers import Minimum
 from ..minimum.problem import FitProblem
 from ..quantities.parameters import Parameters
@@ -83,8 +84,16 @@ def judged_parameters(
         profiler=None if profiles is None else profiles.each,
         nuisance=Nuisance(J[behind:], sum(map(problem.core.absorbed, range(len(problem.experiments))))),
         errors=driven_errors(problem, u, FEW),
+        limits=impossible_ahead(problem, u, r, J),
     )
     return judged, () if profiles is None else tuple(profiles.lower)
+
+
+def impossible_ahead(problem: FitProblem, u: Array, r: Array, J: Array) -> dict[str, str]:
+    """Parameters that stopped at a limit of their sums at the end u of a search (`Coordinates.beyond`): the next step
+    in the parameters themselves goes beyond it. At a minimum inside there is no such step."""
+    coordinates = problem.coordinates
+    return coordinates.beyond(gauss_newton(problem.parameters, u, J, r)) if coordinates.charts else {}
 
 
 def _beside(

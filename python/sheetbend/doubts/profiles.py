@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arrays.timeseries import Array
 from ..errors import SheetbendError
-from ..minimum.approach import step_limits
+from ..minimum.coordinates import step_limits
 from ..minimum.counts import count, counted
 from ..minimum.optimizers import refit
 from ..minimum.problem import FitProblem

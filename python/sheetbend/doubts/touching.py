@@ -105,11 +105,13 @@ def _runs(problem: FitProblem, u: Array) -> list[Trajectory | None]:
 
 
 def _refitted(problem: FitProblem, u: Array, J: Array, name: str, value: float) -> Array:
-    """u with one parameter at a value and the others where they follow to first order, inside their bounds."""
+    """u with one parameter at a value and the others where they follow to first order, inside their bounds, and as a
+    body that is possible where moments of inertia are among them."""
     column = problem.parameters.free.index(name)
     by = problem.parameters[name].to_internal(value) - u[column]
     size = np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny)
     others = np.delete(J / size, column, axis=1)
     follow = np.linalg.lstsq(others, -J[:, column] * by, rcond=RANK_TOLERANCE)[0]
     moved = u + np.insert(follow / np.delete(size, column), column, by)
-    return np.asarray(np.clip(moved, *problem.parameters.limits()))
+    inside = np.asarray(np.clip(moved, *problem.parameters.limits()))
+    return problem.coordinates.out(problem.coordinates.into(inside))

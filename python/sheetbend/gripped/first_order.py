@@ -12,7 +12,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..minimum.approach import RIDGE, inside, step_limits
+from ..minimum.approach import RIDGE, inside
+from ..minimum.coordinates import step_limits
 from ..minimum.problem import FitProblem
 from ..quantities.parameters import Parameter
 from .judging import Errors, Split, Verdict, verdict

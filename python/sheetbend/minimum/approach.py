@@ -5,7 +5,8 @@ ways: a parameter that the data hardly see at this point (a drag far too small) 
 and never returns, or the radius shrinks for its sake and holds up all others. Here each parameter has its own limit for
 one step (a factor of 10 on a log scale, a natural scale elsewhere), and the linear least-squares problem is
 solved inside that box: what would go further stops at its side, and the others take the step that is best given that.
-A weak ridge keeps parameters where they are as long as moving them promises next to nothing.
+A weak ridge keeps parameters where they are as long as moving them promises next to nothing. Steps are taken in the
+coordinates of the problem (`coordinates`), in which no step leaves the possible bodies.
 """
 
 from __future__ import annotations
@@ -18,26 +19,15 @@ import numpy as np
 
 from ..arrays.timeseries import Array
 from ..quantities.parameters import Parameters
+from .coordinates import Coordinates
 from .counts import counted
 
-LOG_STEP = math.log(10.0)
-LINEAR_STEP = 1.0  # natural scales
 RIDGE = 1e-3  # of the cost: what a parameter's longest step must promise to be worth taking
 GOOD, POOR = 0.75, 0.25  # of the decrease that the linear model promises
 WITHIN = 0.9  # of the way to the box's side: such a step was not held up by it
 NEAR = 0.2  # of the longest step: so short a step, and as good as promised, is near the minimum
 LEAST = 1e-8  # of the cost: steps that promise less are left to the optimizer
 SHORTEST = 1e-6  # of the longest step: where no shorter one helps, the slope is wrong
-
-
-def step_limits(parameters: Parameters) -> Array:
-    """The longest step of each free parameter in internal coordinates, shape (free,); infinite where a parameter has
-    neither a log scale nor a natural one."""
-    limits = []
-    for name in parameters.free:
-        p = parameters[name]
-        limits.append(LOG_STEP if p.log else math.inf if p.scale is None else LINEAR_STEP * p.scale)
-    return np.array(limits)
 
 
 @dataclass
@@ -54,6 +44,9 @@ class Walked(Protocol):
 
     @property
     def parameters(self) -> Parameters: ...
+
+    @property
+    def coordinates(self) -> Coordinates: ...
 
     @property
     def cheap_jacobian(self) -> bool: ...
@@ -76,9 +69,10 @@ class Approach:
 
     def __init__(self, problem: Walked, u: Array, tally: Tally | None = None) -> None:
         self.problem, self._tally = problem, tally or Tally()
-        self._lower, self._upper = problem.parameters.limits()
-        self.u = np.clip(u, self._lower, self._upper)
-        self._longest, self._radius = step_limits(problem.parameters), 1.0
+        self._lower, self._upper = problem.coordinates.limits()
+        self._w = np.clip(problem.coordinates.into(u), self._lower, self._upper)
+        self.u = problem.coordinates.out(self._w)
+        self._longest, self._radius = problem.coordinates.longest, 1.0
         self.free = self.near = False
         self.promised = self.taken = 1.0
         self.iterations = 0
@@ -88,10 +82,9 @@ class Approach:
     def least(self) -> float:
         return LEAST
 
-    def _inside(self, lower: Array, upper: Array) -> Array:
+    def _inside(self, J: Any, lower: Array, upper: Array) -> Array:
         """The best step in a box."""
-        assert self._J is not None
-        return inside(self._J, self._r, math.sqrt(2.0 * RIDGE * self.cost) / self._longest, lower, upper)
+        return inside(J, self._r, math.sqrt(2.0 * RIDGE * self.cost) / self._longest, lower, upper)
 
     def _finite(self) -> bool:
         return self._J is not None and bool(np.isfinite(self._J).all())
@@ -119,17 +112,20 @@ class Approach:
             return False
         if self._J is None or not self._finite():
             return False
-        longest, tries = self._longest, 0
+        longest, tries, coordinates = self._longest, 0, self.problem.coordinates
+        slopes = coordinates.jacobian(self._J, self._w)
         while self._radius > SHORTEST:
             tries += 1
             box = self._radius * longest
-            lower, upper = np.maximum(self._lower - self.u, -box), np.minimum(self._upper - self.u, box)
-            s = self._inside(lower, upper)
-            promised = self.cost - 0.5 * float(np.sum((self._r + self._J @ s) ** 2))
+            lower, upper = np.maximum(self._lower - self._w, -box), np.minimum(self._upper - self._w, box)
+            s = self._inside(slopes, lower, upper)
+            promised = self.cost - 0.5 * float(np.sum((self._r + slopes @ s) ** 2))
             self.promised = promised / self.cost
             if self.promised < self.least:
                 return False
-            cost, r, J = self._evaluated(self.u + s, self.problem.cheap_jacobian)
+            w = self._w + s
+            u = coordinates.out(w)
+            cost, r, J = self._evaluated(u, self.problem.cheap_jacobian)
             share, used = (self.cost - cost) / promised, float(np.max(np.abs(s) / longest))
             inner = share > GOOD and used < WITHIN * self._radius
             if share < POOR:
@@ -140,7 +136,7 @@ class Approach:
                 self.near = inner and used < NEAR
                 self.free = inner and tries == 1
                 self.taken = 1.0 - cost / self.cost
-                self.u, self.cost, self._r, self._J = self.u + s, cost, r, J
+                self._w, self.u, self.cost, self._r, self._J = w, u, cost, r, J
                 self.iterations += 1
                 self._tally.iterations += 1
                 return True

@@ -23,8 +23,10 @@ from ..quantities.parameters import Parameters
 from ..statistics.covariance import covariance
 from ..statistics.gauge import RANK_TOLERANCE, null_space
 from .approach import RIDGE, Approach, inside
+from .coordinates import Coordinates
 from .counts import count
-from .problem import FitProblem, expanded_to
+from .parts import expanded_to
+from .problem import FitProblem
 from .workers import Common
 
 CHUNK = 16  # recordings in a piece of work
@@ -144,6 +146,7 @@ class ManyProblem:
     Attributes:
         experiments: in order.
         parameters: own ones expanded to one for each recording that has them.
+        coordinates: those of the parameters.
         own: columns of the own parameters, of each recording.
         shared: columns of the shared ones.
         failure: why the last evaluation was not ok.
@@ -168,6 +171,7 @@ class ManyProblem:
         if in_windows := [e.name for e in experiments if e.shooting is not None]:
             raise InputError("shooting", "does not go with many recordings", in_windows[:5], "use sheetbend.fit")
         self.parameters = expanded_to(parameters, self.experiments)
+        self.coordinates = Coordinates(self.parameters)
         place = {name: column for column, name in enumerate(self.parameters.free)}
         every = [name for name in parameters.free if not parameters[name].private]
         self.shared = np.array([place[name] for name in every], dtype=int)
@@ -305,13 +309,12 @@ class ManyApproach(Approach):
         """See `Approach.least`: many rows would hide a step of a standard deviation."""
         return SMALL / max(self.cost, 1.0)
 
-    def _inside(self, lower: Array, upper: Array) -> Array:
-        assert self._J is not None
+    def _inside(self, J: Arrow, lower: Array, upper: Array) -> Array:
         ridge = math.sqrt(2.0 * RIDGE * self.cost) / self._longest
         for i, columns in enumerate(self._own):
-            part = float(np.linalg.norm(self._J.triangles[i][:, -1]))
+            part = float(np.linalg.norm(J.triangles[i][:, -1]))
             ridge[columns] = math.sqrt(RIDGE) * part / self._longest[columns]
-        return self._J.inside(ridge, lower, upper)
+        return J.inside(ridge, lower, upper)
 
     def _finite(self) -> bool:
         return self._J is not None

@@ -30,7 +30,8 @@ from .growth import over_fit
 from .lifted import Lifted, Motion
 from .lifted_starts import begun
 from .optimizers import Observer, Progress
-from .problem import FitProblem, expanded_to
+from .parts import expanded_to
+from .problem import FitProblem
 
 GROWN = 10.0  # of small displacements, over a window that is chosen
 PARTS = 10  # at least, of a motion whose windows are chosen

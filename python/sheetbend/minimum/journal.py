@@ -30,6 +30,7 @@ import numpy as np
 from .. import _core
 from ..errors import InputError
 from . import content
+from .coordinates import Coordinates
 
 COMMIT_SECONDS = 0.1  # at least, between commits: what a kill may cost besides the evaluation under way
 SHARE, GRACE = 0.02, 0.05  # of the time of evaluations, and s, that writing may take; what is beyond is made again
@@ -299,11 +300,16 @@ class Evaluator:
     def _state(self) -> bytes:
         return self._core.state().tobytes()
 
-    def capsule(self) -> object:
-        """The same for Ceres; the problem must outlive it."""
-        if self._journal is None and isinstance(self._core, _core.Problem):
+    def capsule(self, coordinates: Coordinates) -> object:
+        """The same for Ceres, in the coordinates of a search; the problem must outlive it."""
+        if self._journal is None and not coordinates.charts and isinstance(self._core, _core.Problem):
             return self._core.evaluation()
-        return _core.evaluation_of(self._core.rows, self._core.parameters, self, bool(self._state()))
+
+        def evaluated(w: np.ndarray, jacobian: bool) -> Timed:
+            (ok, r, J), seconds = self(coordinates.out(w), jacobian)
+            return (ok, r, coordinates.jacobian(J, w) if jacobian and ok else J), seconds
+
+        return _core.evaluation_of(self._core.rows, self._core.parameters, evaluated, bool(self._state()))
 
 
 class Interruptible(Protocol):

@@ -16,7 +16,8 @@ from ..optional import require
 from ..quantities.parameters import Parameters
 from .lifted import of_one
 from .lifted_window import LiftedWindow, Rows
-from .problem import FitProblem, expanded_to
+from .parts import expanded_to
+from .problem import FitProblem
 
 FIRST, MORE = 3, 3  # frames of a window that its start is fitted to at first, and how many times as many next
 

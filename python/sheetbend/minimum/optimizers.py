@@ -16,7 +16,7 @@ from ..errors import InputError, SheetbendError
 from ..optional import require
 from ..quantities.wording import short
 from ..statistics.gauge import RANK_TOLERANCE
-from .approach import step_limits
+from .approach import inside
 from .conditioning import Condition
 from .counts import count, counted
 from .problem import FitProblem
@@ -108,8 +108,8 @@ def minimize(
     observe: Observer | None = None,
     first: float | None = None,
 ) -> tuple[Minimum, str]:
-    """Minimize half the sum of squared residuals from u (free,), inside the parameters' limits, no step longer than
-    `approach.step_limits`; also returns the optimizer's name.
+    """Minimize half the sum of squared residuals from u (free,), in the problem's coordinates, inside their limits and
+    by steps no longer than they allow; also returns the optimizer's name.
 
     Args:
         first: the cost at u, where it is known.
@@ -143,13 +143,20 @@ def judged(problem: FitProblem, end: Minimum, first: float) -> Minimum:
 
 
 def promised(problem: FitProblem, u: np.ndarray) -> float:
-    """Share of the cost that a Gauss-Newton step from u inside the bounds would take off, were the residuals linear."""
+    """Share of the cost that a Gauss-Newton step from u inside the bounds would take off, were the residuals linear in
+    the problem's coordinates."""
     ok, r, J = problem.evaluate(u)
-    lower, upper = problem.parameters.limits()
+    lower, upper = problem.coordinates.limits()
+    u = problem.coordinates.into(u)
+    J = problem.coordinates.jacobian(J, u)
     slope, size = J.T @ r, np.linalg.norm(J, axis=0)
     free = (size > RANK_TOLERANCE * np.linalg.norm(r)) & ~((u <= lower) & (slope > 0)) & ~((u >= upper) & (slope < 0))
     if not ok or not free.any() or not r.any():
         return 0.0
+    if problem.coordinates.charts:  # near a limit the linear model would go on for ever
+        longest = problem.coordinates.longest
+        step = inside(J, r, np.zeros(len(u)), np.maximum(lower - u, -longest), np.minimum(upper - u, longest))
+        return float(1.0 - np.sum((r + J @ step) ** 2) / (r @ r))
     columns = J[:, free] / size[free]
     step = np.linalg.lstsq(columns, r, rcond=RANK_TOLERANCE)[0]
     return float(np.sum((columns @ step) ** 2) / (r @ r))
@@ -183,14 +190,16 @@ class _Best:
 
 
 def _ceres(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: float, best: _Best) -> Minimum:
-    """Ceres, with parameters that rest at a limit held there: it searches along every step that it projects."""
-    lower, upper = problem.parameters.limits()
-    u = np.clip(u, lower, upper)
-    held = _resting(problem, u)
-    end = _ceres_holding(problem, u, held, max_iterations, tolerance, best)
-    if end.interrupted or not held or _resting(problem, end.u) >= held:
+    """Ceres, with coordinates that rest at a limit held there: it searches along every step that it projects."""
+    w = np.clip(problem.coordinates.into(u), *problem.coordinates.limits())
+    held = _resting(problem, w)
+    end = _ceres_holding(problem, w, held, max_iterations, tolerance, best)
+    if end.interrupted or not held:
         return end
-    again = _ceres_holding(problem, end.u, frozenset(), max_iterations, tolerance, best)
+    w = problem.coordinates.into(end.u)
+    if _resting(problem, w) >= held:
+        return end
+    again = _ceres_holding(problem, w, frozenset(), max_iterations, tolerance, best)
     return replace(
         again,
         iterations=end.iterations + again.iterations,
@@ -199,39 +208,40 @@ def _ceres(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: f
     )
 
 
-def _resting(problem: FitProblem, u: np.ndarray) -> frozenset[int]:
-    """Parameters that lie at a limit and would go beyond it; not all of them."""
-    lower, upper = problem.parameters.limits()
-    if not ((u <= lower) | (u >= upper)).any():
+def _resting(problem: FitProblem, w: np.ndarray) -> frozenset[int]:
+    """Coordinates that lie at a limit and would go beyond it; not all of them."""
+    lower, upper = problem.coordinates.limits()
+    if not ((w <= lower) | (w >= upper)).any():
         return frozenset()
-    ok, r, J = problem.evaluate(u)
+    ok, r, J = problem.evaluate(problem.coordinates.out(w))
     if not ok:
         return frozenset()
-    slope = J.T @ r
-    resting = np.flatnonzero(((u <= lower) & (slope > 0.0)) | ((u >= upper) & (slope < 0.0)))
-    return frozenset(resting.tolist()) if len(resting) < len(u) else frozenset()
+    slope = problem.coordinates.jacobian(J, w).T @ r
+    resting = np.flatnonzero(((w <= lower) & (slope > 0.0)) | ((w >= upper) & (slope < 0.0)))
+    return frozenset(resting.tolist()) if len(resting) < len(w) else frozenset()
 
 
 def _ceres_holding(
-    problem: FitProblem, u: np.ndarray, held: frozenset[int], max_iterations: int, tolerance: float, best: _Best
+    problem: FitProblem, w: np.ndarray, held: frozenset[int], max_iterations: int, tolerance: float, best: _Best
 ) -> Minimum:
     from .. import _ceres as ceres
 
-    lower, upper = problem.parameters.limits()
+    coordinates = problem.coordinates
+    lower, upper = coordinates.limits()
     interrupted = False
 
     def observe(iteration: int, cost: float, step: float, gradient: float, at: list[float]) -> bool:
-        best(iteration, cost, at)
+        best(iteration, cost, coordinates.out(np.array(at)))
         return True
 
     out: dict[str, Any] = {}
     try:
         out = ceres.minimize(
-            evaluation=problem.evaluator.capsule(),
-            u=u,
+            evaluation=problem.evaluator.capsule(coordinates),
+            u=w,
             lower=lower,
             upper=upper,
-            longest_step=step_limits(problem.parameters),
+            longest_step=coordinates.longest,
             held=sorted(held),
             max_iterations=max_iterations,
             tolerance=tolerance,
@@ -254,10 +264,11 @@ def _ceres_holding(
     if not 0.0 <= out["cost"] < np.inf:  # Ceres tells a cost of -1 where its first point has no derivatives
         counts = out["iterations"], out["evaluations"]
         return Minimum(best.u, best.cost, *counts, False, False, out["message"], jacobians=out["jacobians"])
-    if "jacobian" in out:
-        problem.keep(np.array(out["u"]), out["residual"], out["jacobian"])
+    end = coordinates.out(np.array(out["u"]))
+    if "jacobian" in out and not coordinates.charts:
+        problem.keep(end, out["residual"], out["jacobian"])
     return Minimum(
-        np.array(out["u"]),
+        end,
         out["cost"],
         out["iterations"],
         out["evaluations"],
@@ -270,8 +281,8 @@ def _ceres_holding(
 
 def _scipy(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: float, best: _Best) -> Minimum:
     optimize = require("scipy.optimize", "fit")
-    lower, upper = problem.parameters.bounds()
-    limits, longest = problem.parameters.limits(), step_limits(problem.parameters)
+    coordinates = problem.coordinates
+    bounds, limits, longest = coordinates.bounds(), coordinates.limits(), coordinates.longest
     last: dict[str, Any] = {"u": None}
     left: np.ndarray | None = None  # where the step began
     tried, before = 0, counted()
@@ -286,20 +297,19 @@ def _scipy(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: f
         if last["u"] is None or not np.array_equal(last["u"], at) or (jacobian and last["J"] is None):
             tried += 1
             jacobian |= problem.cheap_jacobian  # most steps are taken, and then it is needed anyway
-            ok, r, J = problem.evaluate(at, jacobian)
-            last.update(
-                u=at.copy(), r=r if ok else np.full(problem.core.rows, np.inf), J=J if jacobian and ok else None
-            )
+            ok, r, J = problem.evaluate(coordinates.out(at), jacobian)
+            slopes = coordinates.jacobian(J, at) if jacobian and ok else None
+            last.update(u=at.copy(), r=r if ok else np.full(problem.core.rows, np.inf), J=slopes)
             if ok:
-                best(tried, 0.5 * float(r @ r), at)
+                best(tried, 0.5 * float(r @ r), coordinates.out(at))
         return last
 
     try:
         out = optimize.least_squares(
             lambda at: evaluated(at, False)["r"],
-            np.clip(u, *limits),
+            np.clip(coordinates.into(u), *limits),
             jac=lambda at: evaluated(at, True)["J"],
-            bounds=(lower, upper),
+            bounds=bounds,
             x_scale="jac",
             ftol=max(tolerance, 1e-15),
             xtol=max(tolerance, 1e-15),
@@ -311,5 +321,13 @@ def _scipy(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: f
         counts = tried, made[0] - before[0]
         return Minimum(best.u, best.cost, *counts, False, True, words, jacobians=made[1] - before[1])
     made = counted()
-    found = (out.x, float(out.cost), int(out.njev), made[0] - before[0], out.status > 0, False, out.message)
+    found = (
+        coordinates.out(out.x),
+        float(out.cost),
+        int(out.njev),
+        made[0] - before[0],
+        out.status > 0,
+        False,
+        out.message,
+    )
     return Minimum(*found, jacobians=made[1] - before[1])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,10 +18,12 @@ from ..quantities.quantities import Quantity
 from ..recording.recording import Recording
 from ..statistics.covariance import Layout
 from . import content
+from .coordinates import Coordinates, sums_of
 from .counts import count
 from .journal import Evaluator
 from .lifted import Known, lifted
-from .spread import Spread, reaching
+from .parts import expanded_to, reaching
+from .spread import Spread
 
 ParameterLike = Parameter | Mapping[str, Any] | None
 NOTHING = np.zeros((0, 1, 3))  # no correction at any knot
@@ -80,14 +83,6 @@ def as_parameters(
     return Parameters(complete)
 
 
-def expanded_to(parameters: Parameters, experiments: Sequence[Experiment]) -> Parameters:
-    """With private parameters expanded to one for each experiment that has them."""
-    has = {f"{name}[{e.name}]": q.value for e in experiments for name, q in e.scene.quantities.items()}
-    every = parameters.expand([e.name for e in experiments], has)
-    private = {f"{p.name}[{e.name}]" for p in parameters.values() if p.private for e in experiments}
-    return Parameters(p for name, p in every.items() if name not in private or name in has)
-
-
 class FitProblem:
     """Experiments with shared and private parameters, compiled for one set of recordings' parts.
 
@@ -142,6 +137,13 @@ class FitProblem:
         """Made again from what it was made from."""
         made_from = (self.experiments, self.given, self.recordings, self.threads, self.parameters, self._corrected)
         return FitProblem, made_from
+
+    @cached_property
+    def coordinates(self) -> Coordinates:
+        """In which a search takes its steps."""
+        return Coordinates(
+            self.parameters, [s for e in self.experiments for s in sums_of(e.scene, self._keys(e), self.parameters)]
+        )
 
     def known(self, u: np.ndarray) -> tuple[np.ndarray, list[list[int]], dict[int, tuple[str, float]]]:
         """All values at u, where each experiment's quantities are among them, and by place the parameter that is there:

@@ -124,11 +124,3 @@ def _evaluated(parts: _Parts, item: tuple[range, Array, bool]) -> Piece:
     ok, r, J = problem.core.evaluate(u, jacobian)
     rows = problem.core.data_rows
     return ok, r[:rows], J[:rows], "" if ok else problem.failure
-
-
-def reaching(parameters: Parameters, names: set[str]) -> Parameters:
-    """The parameters that are carried by some of the free ones or by none."""
-    free = set(parameters.free)
-    return Parameters(
-        p for key, p in parameters.items() if (root := parameters.roots[key][0]) in names or root not in free
-    )

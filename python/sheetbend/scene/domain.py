@@ -59,6 +59,31 @@ class Domain:
         offset, size = self._layout[array]
         return flat[offset : offset + size]
 
+    def sums(self) -> list[tuple[dict[str, float], float]]:
+        """The masses that are differences of quantities: coefficients by quantity, and a constant. Such are those of a
+        body's axes, (I1 + I2 + I3)/2 - I_k: a moment of inertia is less than the sum of the two others."""
+        mass = [t for t in self._scene.terms if t.array == "mass"]
+        count = self._layout["mass"][1]
+        entries: set[int] = set()
+        for t in mass:
+            down = np.broadcast_to(np.less(t.coefficient, 0.0), np.shape(np.ravel(t.index)))
+            entries |= set(t.places(0, count)[down].tolist())
+        found: dict[int, tuple[dict[str, float], float]] = {i: ({}, 0.0) for i in entries}
+        base = self._scene.base_arrays()["mass"] if entries else np.zeros(0)
+        for t in mass:
+            for i, c in np.broadcast(t.places(0, count), t.coefficient):
+                if i not in found:
+                    continue
+                parts, constant = found[i]
+                if not t.quantities:
+                    found[i] = parts, constant + float(c)
+                elif not t.exponents and [f for _, f in t.factors] == ["identity"]:
+                    name = t.factors[0][0]
+                    parts[name] = parts.get(name, 0.0) + float(c)
+                else:  # no sum of quantities
+                    del found[i]
+        return [(parts, constant + float(base[i])) for i, (parts, constant) in sorted(found.items())]
+
     def check_quantities(self, theta: Array) -> None:
         """Refuse values (scenes, quantities) that are not finite or outside the range of their quantity.
 

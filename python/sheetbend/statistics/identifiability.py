@@ -59,6 +59,7 @@ def identify(
     profiler: Profiler | None = None,
     nuisance: Nuisance | None = None,
     errors: Array | None = None,
+    limits: Mapping[str, str] | None = None,
     rank_tolerance: float = RANK_TOLERANCE,
 ) -> Identifiability:
     """Judge every free parameter of a finished fit.
@@ -77,6 +78,7 @@ def identify(
         nuisance: what unknowns left that were solved for at every point.
         errors: (rows, draws) random draws of errors of the residuals that are alike in all of the data, such as noise
             of what drives a scene makes.
+        limits: where parameters stopped because a body beyond is impossible, in words, by parameter.
         rank_tolerance: see `gauge.RANK_TOLERANCE`.
 
     Raises:
@@ -87,7 +89,7 @@ def identify(
     _check(parameters, internal, residuals, jacobian, {*floors, *discretization, *systematic})
     nuisance = nuisance or Nuisance(np.zeros((0, len(parameters.free))), 0.0)
     errors = np.zeros((len(residuals), 0)) if errors is None else errors
-    judge = Judge(parameters, internal, residuals, jacobian, layout, rank_tolerance, nuisance, errors)
+    judge = Judge(parameters, internal, residuals, jacobian, layout, rank_tolerance, nuisance, errors, limits or {})
     linear = [
         judge.linear(column, (discretization.get(name, 0.0), systematic.get(name, 0.0)))
         for column, name in enumerate(parameters.free)

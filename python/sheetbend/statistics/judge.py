@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -102,8 +103,9 @@ class Judge:
         tolerance: float,
         nuisance: Nuisance,
         errors: Array,
+        limits: Mapping[str, str],
     ) -> None:
-        self.parameters, self.internal = parameters, internal
+        self.parameters, self.internal, self.limits = parameters, internal, limits
         self.quantile = require("scipy.special", "fit").stdtrit
         names, log = parameters.free, [parameters[name].log for name in parameters.free]
         data = np.vstack([jacobian, nuisance.jacobian])
@@ -115,7 +117,7 @@ class Judge:
         lower, upper = parameters.bounds()
         near = _AT_BOUND * np.maximum(np.abs(internal), 1e-3)
         self.at_lower, self.at_upper = internal - lower <= near, upper - internal <= near
-        bounded = self.at_lower | self.at_upper
+        bounded = self.at_lower | self.at_upper | np.isin(names, list(limits))
         unique = [column for column in range(len(names)) if column not in self.space.pivots]
         # A parameter at its bound stays there for the others; its own interval lets all of them move.
         self.columns = [column for column in unique if not bounded[column]]
@@ -194,7 +196,7 @@ class Judge:
         elif at_far_limit(parameter, value):
             verdict, words = "at a bound", f"{ran_off_words(parameter, value)} (as far as a search looks)"
         elif (limit := self._limit(linear.column)) is not None:
-            verdict, words = "at a bound", f"stopped at its {limit}: widen it, or doubt the model"
+            verdict, words = "at a bound", limit
         elif lower is None or upper is None:
             verdict, words = "one-sided", side_words(parameter, lower, upper)
         else:
@@ -272,9 +274,13 @@ class Judge:
 
     def _limit(self, column: int) -> str | None:
         parameter = self.parameters[self.parameters.free[column]]
-        if self.at_lower[column]:
-            return f"lower bound {quantity(parameter.lower, parameter)}"
-        return f"upper bound {quantity(parameter.upper, parameter)}" if self.at_upper[column] else None
+        if parameter.name in self.limits:
+            where = f"stopped where {self.limits[parameter.name]}, as in a body without thickness"
+            return f"{where}: no body lies beyond; doubt the model"
+        if not (self.at_lower[column] or self.at_upper[column]):
+            return None
+        side, bound = ("lower", parameter.lower) if self.at_lower[column] else ("upper", parameter.upper)
+        return f"stopped at its {side} bound {quantity(bound, parameter)}: widen it, or doubt the model"
 
 
 def _with_answers(found: Ends, linear: Ends) -> tuple[Ends, str]:
