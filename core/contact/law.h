@@ -9,7 +9,7 @@
 // from the signs here and are decided nowhere else. All vectors are in the collider's frame, which turns what is carried along with it.
 #pragma once
 
-#include "core/scalar/vec3.h"
+#include "core/contact/plain_vec3.h"
 
 namespace sheetbend {
 
@@ -23,10 +23,10 @@ struct ContactForce {
   bool pushes = false, slides = false, rubs = false;  // rubs: pushes, and friction or dissipation may act: no potential
 };
 
-// T is never a pack. `loss` is a/eta, of a contact that dissipates.
-template <class T>
-ContactForce<T> contact_force(const T& gap, const Vec3<T>& n, const Vec3<T>& slip, const Vec3<T>& carried,
-                              const T& friction, const T& kappa, const T* loss = nullptr) {
+// T is never a pack; C is T, or double where these numbers do not vary. `loss` is a/eta, of a contact that dissipates.
+template <class T, class C>
+ContactForce<T> contact_force(const T& gap, const Vec3<C>& n, const Vec3<T>& slip, const Vec3<C>& carried,
+                              const C& friction, const C& kappa, const C* loss = nullptr) {
   ContactForce<T> c;
   if (!(value_of(gap) < 0.0)) return c;
   c.normal = -(kappa * gap);

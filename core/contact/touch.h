@@ -25,13 +25,14 @@ struct Touch : ContactForce<T> {
   Vec3<T> force;  // on the particle
 };
 
-// At this distance, with this gradient. The push is along the gradient, so that it has a potential, and Coulomb's limit is that of the whole push.
-template <class T>
-Touch<T> touch(const AnyShape& shape, const T& distance, const Vec3<T>& n, const Vec3<T>& z,
-               const ContactNumbers<T>& c) {
-  const T gap = T(c.firm) * (distance - c.radius - c.lift);
-  const T friction = shape.grid ? sqrt(dot(n, n)) * c.friction : c.friction;
-  const T* loss = c.dissipates ? &c.loss : nullptr;
+// At this distance, with this gradient; C as in law.h. The push is along the gradient, so that it has a potential, and Coulomb's limit is that of the
+// whole push.
+template <class T, class C>
+Touch<T> touch(const AnyShape& shape, const T& distance, const Vec3<C>& n, const Vec3<T>& z,
+               const ContactNumbers<C>& c) {
+  const T gap = T(c.firm) * (distance - T(c.radius) - T(c.lift));
+  const C friction = shape.grid ? sqrt(dot(n, n)) * c.friction : c.friction;
+  const C* loss = c.dissipates ? &c.loss : nullptr;
   Touch<T> t{contact_force(gap, unit_normal(shape, n), z - c.from, c.carried, friction, c.kappa, loss), {}};
   if (t.pushes) t.force = t.normal * n + t.tangential;
   return t;
@@ -66,16 +67,16 @@ inline Touch<double> touch_matrix(const AnyShape& shape, const Vec3<double>& z, 
   const Touch<double> plain = touch(shape, distance, Vec3<double>(n), z, c);
   std::fill_n(A, 9, 0.0);
   if (!plain.pushes) return plain;
-  D zd[3], distance_d(distance), n_d[3] = {n[0], n[1], n[2]};
+  D zd[3], force[3], distance_d(distance);
   for (int d = 0; d < 3; ++d) {
     zd[d] = D(at[d]);
     zd[d].d[d] = 1.0;
     distance_d.d[d] = n[d];
   }
-  const ContactNumbers<D> cd = constants<D>(c);
-  if (curved) distance_from(shape, zd, cd.size, distance_d, n_d);
-  D force[3];
-  touch(shape, distance_d, Vec3<D>(n_d), Vec3<D>(zd), cd).force.store(force);
+  if (curved)
+    touch(shape, Vec3<D>(zd), constants<D>(c)).force.store(force);
+  else
+    touch(shape, distance_d, Vec3<double>(n), Vec3<D>(zd), c).force.store(force);
   for (int a = 0; a < 3; ++a)
     for (int b = 0; b < 3; ++b) A[3 * a + b] = -force[a].d[b];
   return plain;

@@ -3,8 +3,8 @@ ropes that a hand drags around a post and through a gap, and two under a bar, wh
 
     python experiments/rope_control/control.py [FOLDER] [--seconds 8] [--posts 150]
 
-It checks the gradients, reaches the targets by L-BFGS, gives CMA-ES the same processor time (with `pip install cma`),
-prints a table and writes FOLDER/control.png and FOLDER/posts.png (out/rope_control by default).
+It checks the gradients, reaches the targets by L-BFGS or Gauss-Newton, gives CMA-ES the same processor time (with
+`pip install cma`), prints a table and writes FOLDER/control.png and FOLDER/posts.png (out/rope_control by default).
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import sheetbend as sb
 from drawn import draw
+from least_squares import gauss_newton
 from lift import lift
 from posts import gap, wrap
 from search import Search, descend, descend_again, evolve, gradient_gap
@@ -30,7 +31,8 @@ def solve(task: Task, seconds: float) -> list[Search]:
     first = task.outcome(np.zeros(task.size))
     print(f"{task.name}: {task.size} unknowns; without a motion {1e3 * first.error:.0f} mm from the target")
     touches = bool(task.control.scene.contacts.contacts)  # what sticks and slips puts kinks into the cost
-    searches = [descend_again(task, seconds) if touches else descend(task, seconds)]
+    descent = descend if task.residuals is None else gauss_newton
+    searches = [descend_again(task, seconds, descent=descent) if touches else descend(task, seconds)]
     step = 1e-5 if touches else 1e-3
     differ = gradient_gap(task, 0.5 * searches[0].best, step=step)
     print(f"  gradient against central differences, at half the motion found: {differ:.1e} of the largest entry")

@@ -15,7 +15,7 @@ from task import Task
 
 SHAPES = 9  # of the rope over time, in one picture
 AWAY = np.array([0.45, 0.25])  # how much of the depth y is drawn along x and z
-COLORS = {"L-BFGS": ACCENT, "CMA-ES": WARM}
+COLORS = {"L-BFGS": ACCENT, "Gauss-Newton": ACCENT, "CMA-ES": WARM}
 
 
 def draw(found: Sequence[tuple[Task, list[Search]]], path: Path) -> None:

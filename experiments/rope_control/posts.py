@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import sheetbend as sb
 from motion import RATE, Array, Control, Motion
+from scipy.sparse import csr_array
 from task import Task
 
 MOVING, AT_END = 1.5, 3  # s, of the motion, and how many of the frames look at where the rope lies
@@ -55,24 +56,34 @@ def to_target(name: str, control: Control, posts: Sequence[tuple[float, float, f
     def error(x: Array) -> float:
         return float(np.sqrt(np.mean(np.sum((x[-AT_END:, nodes] - target) ** 2, axis=-1))))
 
-    def loss(x: Array) -> tuple[float, Array]:
-        bar = np.zeros_like(x)
-        gap = (x[-AT_END:, nodes] - target) / NEAR
-        count = AT_END * len(nodes)
-        bar[-AT_END:, nodes] = 2.0 * gap / NEAR / count
-        cost = float((gap * gap).sum()) / count
+    def residuals(x: Array) -> tuple[Array, csr_array]:
+        """How far the rope is from its target, and how much too near the hand comes to each post in each frame."""
+        at = np.arange(x.size).reshape(x.shape)
+        scale = 1.0 / (NEAR * np.sqrt(AT_END * len(nodes)))
+        ends = at[-AT_END:, nodes].ravel()
+        values, parts = [scale * (x[-AT_END:, nodes] - target).ravel()], [np.full(ends.size, scale)]
+        rows, columns, first = [np.arange(ends.size)], [ends], ends.size
         for *center, radius in posts:
             away = x[:, nodes[-1], :2] - center
             distance = np.linalg.norm(away, axis=-1)
             deep = np.maximum(radius + CLEAR - distance, 0.0) / NEAR
-            cost += float((deep**2).sum())
-            bar[:, nodes[-1], :2] -= (2.0 * deep / NEAR / distance)[:, None] * away
-        return cost, bar
+            values.append(deep)
+            parts.append(((deep > 0.0) / (-NEAR * distance))[:, None] * away)
+            rows.append(np.repeat(first + np.arange(len(x)), 2))
+            columns.append(at[:, nodes[-1], :2].ravel())
+            first += len(x)
+        entries = np.concatenate([part.ravel() for part in parts])
+        where = np.concatenate(rows), np.concatenate(columns)
+        return np.concatenate(values), csr_array((entries, where), shape=(first, x.size))
+
+    def loss(x: Array) -> tuple[float, Array]:
+        rest, derivative = residuals(x)
+        return float(rest @ rest), 2.0 * (derivative.T @ rest).reshape(x.shape)
 
     def speed(x: Array) -> float:
         return float(np.linalg.norm(x[-1, nodes] - x[-2, nodes], axis=-1).max() / (FRAMES[-1] - FRAMES[-2]))
 
-    return Task(name, control, FRAMES, SOLVER, target, loss, error, speed, arrived, EFFORT, tuple(posts))
+    return Task(name, control, FRAMES, SOLVER, target, loss, error, speed, arrived, EFFORT, residuals, tuple(posts))
 
 
 def wrap() -> Task:

@@ -1,8 +1,9 @@
-"""Two ways to a task's target: along the gradient by L-BFGS, and by an evolution strategy that sees costs alone."""
+"""Ways to a task's target: along the gradient by L-BFGS, and by an evolution strategy that sees costs alone."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -43,6 +44,7 @@ class Search:
 
     def continue_with(self, other: Search) -> None:
         """Append what another search has tried."""
+        self.name = other.name
         self.lost += other.lost
         for at, outcome in zip(other.seconds, other.outcomes, strict=True):
             better = not self.outcomes or outcome.cost < self.outcomes[-1].cost
@@ -93,17 +95,24 @@ def descend(task: Task, seconds: float, start: Array | None = None, most: int = 
     return search
 
 
-def descend_again(task: Task, seconds: float, tries: int = 20, most: int = 25, seed: int = 1) -> Search:
-    """L-BFGS, and again from the best motion with a disturbance, until the target is reached or the time is spent.
+def descend_again(
+    task: Task,
+    seconds: float,
+    tries: int = 20,
+    most: int = 25,
+    seed: int = 1,
+    descent: Callable[[Task, float, Array, int], Search] = descend,
+) -> Search:
+    """A descent, and again from the best motion with a disturbance, until the target is reached or the time is spent.
 
     Contacts that begin, slide and stick put kinks and minima into the cost, at which a descent ends.
     """
-    random, began, whole = np.random.default_rng(seed), time.process_time(), Search("L-BFGS", np.zeros(task.size))
-    start = whole.best
+    random, began, start = np.random.default_rng(seed), time.process_time(), np.zeros(task.size)
+    whole = Search("", start)
     for k in range(tries):
         left = seconds - (time.process_time() - began)
         try:
-            whole.continue_with(descend(task, left, start, most))
+            whole.continue_with(descent(task, left, start, most))
         except FAILURES:  # the disturbed motion cannot be simulated
             whole.lost += 1
         if left < 0.0 or whole.outcomes[-1].reached:

@@ -14,7 +14,7 @@ import pytest
 import sheetbend as sb
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "rope_control"
-MODULES = ("motion", "task", "whip", "shape", "posts", "lift", "search", "drawn", "control")
+MODULES = ("motion", "task", "whip", "shape", "posts", "lift", "search", "least_squares", "drawn", "control")
 LONG = 60.0  # s; searches end by their number of rollouts
 
 
@@ -67,6 +67,18 @@ def test_gradient_beside_posts(scripts, name):
     assert scripts.search.gradient_gap(task, somewhere(task, 0.05), np.eye(task.size)[::5], step=1e-5) < 1e-6
 
 
+def test_residuals_are_those_of_the_loss_and_the_gradient(scripts):
+    task = scripts.posts.wrap()
+    u = somewhere(task, 0.05)
+    u[8:] += 0.15  # towards the post, where the hand is too near
+    outcome, rest, jacobian = task.outcome_and_residuals(u)
+    other, gradient = task.outcome_and_gradient(u)
+    assert outcome == other
+    assert rest @ rest == pytest.approx(outcome.cost, rel=1e-12)
+    assert np.count_nonzero(rest) > 3 * 3 * 31 - 31 * 3  # not the heights alone
+    assert np.abs(2.0 * jacobian.T @ rest - gradient).max() < 1e-9 * np.abs(gradient).max()
+
+
 def test_gradient_of_the_lift(scripts):
     task = scripts.lift.lift()
     assert scripts.search.gradient_gap(task, somewhere(task, 0.05), np.eye(task.size)[::8], step=1e-6) < 1e-5
@@ -79,6 +91,22 @@ def test_the_bar_is_lifted_to_its_target(scripts):
     search = scripts.search.descend_again(scripts.lift.lift(), LONG)
     assert search.outcomes[0].error > 0.1
     assert search.outcomes[-1].reached
+
+
+def test_the_rope_is_drawn_through_the_gap(scripts):
+    search = scripts.least_squares.gauss_newton(scripts.posts.gap(), LONG, most=20)
+    first, last = search.outcomes[0], search.outcomes[-1]
+    assert first.error > 0.9
+    assert last.reached and last.error < 1e-2 and last.speed < 0.05
+
+
+@pytest.mark.slow
+def test_the_rope_is_wrapped_around_the_post(scripts):
+    descent = scripts.least_squares.gauss_newton
+    search = scripts.search.descend_again(scripts.posts.wrap(), 10.0 * LONG, descent=descent)
+    assert search.name == "Gauss-Newton"
+    assert search.outcomes[0].error > 0.3
+    assert search.outcomes[-1].reached and search.outcomes[-1].error < 1e-2
 
 
 @pytest.mark.parametrize("fast", [0.0, 15.0])

@@ -100,6 +100,48 @@ def test_a_number_of_rings_that_misses_the_plates_is_refused():
         textile.drape_scene(WOVEN, rings=10)
 
 
+# --- on plates that it touches
+
+
+@pytest.mark.parametrize("cover", [True, False])
+def test_a_cloth_that_touches_its_plates(cover):
+    held = textile.drape(WOVEN, rings=RINGS, folds=(4,)).states[0]
+    state = textile.drape(WOVEN, rings=RINGS, folds=(4,), friction=0.3, cover=cover).states[0]
+    cloth = state.rest.scene.cloths["cloth"]
+    over = state.rest.positions[cloth.particles[cloth.mesh.sets["support"]]]
+    off = 100.0 * (held.coefficient.value - state.coefficient.value)
+    assert (state.nodes, state.rest.unstable_modes) == (held.nodes, 0)
+    assert over[:, 2].min() > -1e-6  # nothing goes into the plate
+    if cover:
+        assert over[:, 2].max() < 1e-6
+        assert 0.0 < off < 0.3
+    else:
+        assert 3e-4 < over[:, 2].max() < 3e-3  # it lifts off beside the edge
+        assert 0.3 < off < 2.0
+
+
+@pytest.mark.parametrize("cover", [True, False])
+@pytest.mark.parametrize("name", ["cloth_bending", "plate_friction"])
+def test_gradient_on_plates(name, cover):
+    fabric = replace(WOVEN, weft=1500.0, bending_weft=1e-5)
+    start = textile.drape(fabric, rings=7, folds=(5,)).states[0].rest.positions
+    scene = textile.drape_scene(fabric, rings=7, friction=0.3, cover=cover)
+
+    def coefficient(**values):
+        return textile.drape_state(sb.equilibrium(scene, start, values)).coefficient
+
+    value, step = {"cloth_bending": (fabric.bending, 1e-5), "plate_friction": (0.3, 1e-3)}[name]
+    high, low = (coefficient(**{name: value * (1.0 + sign * step)}).value for sign in (1.0, -1.0))
+    assert coefficient().gradient[name] == approx((high - low) / (2.0 * step * value), rel=1e-3)
+
+
+def test_plates_that_cannot_be_are_refused():
+    with pytest.raises(sb.InputError, match="friction"):
+        textile.drape_scene(WOVEN, rings=RINGS, friction=0.0)
+    with pytest.raises(sb.InputError, match="cover"):
+        textile.drape(WOVEN, rings=RINGS, folds=(4,), cover=False)
+
+
 # --- the shadow
 
 

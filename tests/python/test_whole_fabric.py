@@ -215,6 +215,13 @@ class TestOutlines:
         assert own.laboratory == textile.drape(fabric, folds=(5,)).coefficient.laboratory
         assert own.gradient["cloth_bending"] > 0.0
 
+    def test_a_drape_may_touch_its_plate_instead(self) -> None:
+        fabric = sb.Fabric(density=0.2, warp=600.0, shear=30.0, bending=3e-5)
+        outlines = [textile.Outline("a", wavy())]
+        held, touching = draped(outlines, 0.3, 0.18), draped(outlines, 0.3, 0.18, friction=0.3, cover=False)
+        lower = held.test(fabric).laboratory - touching.test(fabric).laboratory
+        assert 1.0 < lower < 3.0
+
 
 def test_bias_pulls_tell_shear() -> None:
     fabric = sb.Fabric(density=0.2, warp=600.0, shear=30.0, bending=3e-5)

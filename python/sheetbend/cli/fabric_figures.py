@@ -41,7 +41,15 @@ def draped_rest(study: FabricStudy, found: WholeFabric) -> Equilibrium:
     sizes = study.config.drape
     assert sizes is not None  # what sent it here
     folds = round(float(np.median([outline.nodes for outline in study.outlines])))
-    return drape(found.fit.fabric, diameter=sizes.diameter, plate=sizes.plate, folds=(folds,)).states[0].rest
+    found_drape = drape(
+        found.fit.fabric,
+        diameter=sizes.diameter,
+        plate=sizes.plate,
+        folds=(folds,),
+        friction=sizes.friction,
+        cover=sizes.cover,
+    )
+    return found_drape.states[0].rest
 
 
 def _draw_drape(study: FabricStudy, found: WholeFabric, path: Path) -> None:

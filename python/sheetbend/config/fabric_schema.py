@@ -85,7 +85,17 @@ class DrapeTest(Section):
     picture_width: Positive | None = key(None, "how much a picture shows from side to side", "m")
     diameter: Positive = key(0.3, "of the cloth", "m")
     plate: Positive = key(0.18, "of the plates", "m")
+    friction: Positive | None = key(
+        None, "of the plates, which the cloth then touches; held flat between them when left out"
+    )
+    cover: bool = key(True, "whether a second plate lies on the cloth; without it give the friction")
     error: Positive = key(3.0, "points of the coefficient by which stable states of one fabric differ")
+
+    @model_validator(mode="after")
+    def _rubs_without_a_cover(self) -> Self:
+        if not self.cover and self.friction is None:
+            raise ValueError("has no cover and no friction|give the friction of the plate too, or leave out cover")
+        return self
 
 
 class Given(Section):

@@ -69,8 +69,8 @@ def load_fabric_tests(path: str | Path) -> FabricStudy:
             readings.setdefault("shear", []).extend(bias_pulled(curves["bias"], by_direction["bias"].cycle))
     if config.drape is not None:
         with _at("drape"):
-            sizes = (config.drape.diameter, config.drape.plate, config.drape.error)
-            readings["drape"] = [draped(outlines, *sizes)]
+            of = config.drape
+            readings["drape"] = [draped(outlines, of.diameter, of.plate, of.error, of.friction, of.cover)]
     straight = [p for p in config.pull if p.along != "bias"]
     ways = {(p.way, p.cycle) for p in straight}
     if len(ways) > 1:

@@ -8,13 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import MeshError
+from ..arrays.checks import is_number
+from ..errors import InputError, MeshError
 from ..mesh import TriangleMesh, disk
 from ..motion.equilibrium import Equilibrium, NoEquilibriumError, equilibrium
 from ..objects.cloth import add_cloth
 from ..objects.fabric import Fabric
+from ..scene.colliders import Plane
 from ..scene.scene import Array, Scene
-from .reading import Reading
+from .reading import Reading, combined
 from .shadow import Shadow, shadow
 
 _SAME = 1e-6  # relative difference in energy below which two states are one, turned or mirrored
@@ -63,6 +65,8 @@ def drape(
     plate: float = 0.18,
     rings: int = 11,
     folds: Sequence[int] = (4, 5, 6, 7),
+    friction: float | None = None,
+    cover: bool = True,
 ) -> Drape:
     """The drape test of BS 5058 and ISO 9073-9, after Cusick (1965): 30 cm of cloth between plates of 18 cm.
 
@@ -75,17 +79,25 @@ def drape(
         diameter, plate: of cloth and plates, m.
         rings: of the mesh's vertices between center and rim.
         folds: of the starts.
+        friction: Coulomb's coefficient of the plates, which the cloth then touches. None = the cloth is held, flat and
+            without slip, which moves the coefficient by less than 0.2 points (docs/fabric.md).
+        cover: whether a second plate lies on the cloth, so that it cannot lift off the one below.
 
     Raises:
         MeshError: plates as large as the cloth, or a number of rings of which none fits the plates' edge.
+        InputError: a friction that is not positive, or no cover on a cloth that is held.
         NoEquilibriumError: no start leads to a state of rest.
     """
+    _check_plates(friction, cover)
     states: list[DrapeState] = []
     lost = []
     for count in folds:
         scene = drape_scene(fabric, diameter, plate, rings)
         try:
-            state = drape_state(equilibrium(scene, _folded(scene.cloths["cloth"].mesh, count)), plate)
+            rest = equilibrium(scene, _folded(scene.cloths["cloth"].mesh, count))
+            if friction is not None:
+                rest = equilibrium(drape_scene(fabric, diameter, plate, rings, friction, cover), rest.positions)
+            state = drape_state(rest, plate)
         except NoEquilibriumError:
             lost.append(count)
             continue
@@ -98,18 +110,43 @@ def drape(
     return Drape(states[0].coefficient, states[0].nodes, tuple(states), tuple(lost))
 
 
-def drape_scene(fabric: Fabric, diameter: float = 0.3, plate: float = 0.18, rings: int = 11) -> Scene:
-    """The cloth flat between its plates, held on them.
+def drape_scene(
+    fabric: Fabric,
+    diameter: float = 0.3,
+    plate: float = 0.18,
+    rings: int = 11,
+    friction: float | None = None,
+    cover: bool = True,
+) -> Scene:
+    """The cloth flat between its plates: held on them, or with a `friction` pinned in its middle alone. Friction counts
+    from where an equilibrium starts, so start that of the second at rest of the first.
 
     Raises:
         MeshError: plates as large as the cloth, or a number of rings of which none fits the plates' edge.
+        InputError: a friction that is not positive, or no cover on a cloth that is held.
     """
+    _check_plates(friction, cover)
     mesh = _mesh(diameter / 2.0, plate / 2.0, rings)
     scene = Scene("drape")
     held = mesh.sets["support"]
-    cloth = add_cloth(scene, mesh, held=held, **fabric.options())
-    scene.pin(cloth.particles[held])
+    if friction is None:
+        cloth = add_cloth(scene, mesh, held=held, **fabric.options())
+        scene.pin(cloth.particles[held])
+        return scene
+    cloth = add_cloth(scene, mesh, **fabric.options())
+    scene.pin(cloth.particles[mesh.sets["center"]])
+    for name, side in (("plate", 1.0), ("cover", -1.0)) if cover else (("plate", 1.0),):
+        flat = Plane(normal=(0.0, 0.0, side), name=name)
+        scene.contact(cloth.particles[np.setdiff1d(held, mesh.sets["center"])], flat, friction=friction)
     return scene
+
+
+def _check_plates(friction: float | None, cover: bool) -> None:
+    if friction is None and not cover:
+        raise InputError("cover", "is left out where the cloth is held", cover, "give the friction of the plate too")
+    if friction is not None and not (is_number(friction) and friction > 0.0):
+        problem = "must be positive, because nothing else keeps the cloth from turning"
+        raise InputError("friction", problem, friction, "give Coulomb's coefficient, such as 0.3")
 
 
 def _mesh(radius: float, plate: float, rings: int) -> TriangleMesh:
@@ -137,7 +174,9 @@ def drape_state(rest: Equilibrium, plate: float = 0.18) -> DrapeState:
     ring = flat.area - covered
     bar = np.zeros_like(rest.positions)
     bar[cloth.particles] = seen.area_bar / ring
-    coefficient = Reading((seen.area - covered) / ring, "", rest.gradient(bar), "%", 100.0)
+    places = tuple(f"{name}_{axis}" for name in rest.scene.contacts.colliders for axis in "xyz")
+    gradient = combined((1.0, rest.gradient(bar)), leave=places)
+    coefficient = Reading((seen.area - covered) / ring, "", gradient, "%", 100.0)
     return DrapeState(coefficient, seen.nodes, rest.energy, seen.hidden, rest)
 
 

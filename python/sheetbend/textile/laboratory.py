@@ -85,13 +85,21 @@ def bias_pulled(curves: Sequence[Curve], cycle: int = 0, error: float = MACHINE)
     return found
 
 
-def draped(outlines: Sequence[Outline], diameter: float, plate: float, error: float = DRAPED) -> Measured:
+def draped(
+    outlines: Sequence[Outline],
+    diameter: float,
+    plate: float,
+    error: float = DRAPED,
+    friction: float | None = None,
+    cover: bool = True,
+) -> Measured:
     """The drape coefficient of shadows, compared with the fabric's own state of as many folds.
 
     Args:
         outlines: a specimen each.
         diameter, plate: of cloth and plates, m.
         error: points of the coefficient by which states of one fabric differ.
+        friction, cover: of the plates, see `drape`.
     """
     values = [outline.coefficient(diameter, plate) for outline in outlines]
     folds = round(float(np.median([outline.nodes for outline in outlines])))
@@ -100,7 +108,9 @@ def draped(outlines: Sequence[Outline], diameter: float, plate: float, error: fl
     return Measured.of_specimens(
         specimens,
         name="drape coefficient",
-        test=lambda f: drape(f, diameter=diameter, plate=plate, folds=(folds,)).coefficient,
+        test=lambda f: (
+            drape(f, diameter=diameter, plate=plate, folds=(folds,), friction=friction, cover=cover).coefficient
+        ),
         error=error,
         note=note,
     )
