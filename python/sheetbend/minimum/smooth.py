@@ -24,7 +24,8 @@ from ..result.field import FieldFit
 from ..statistics.covariance import autocorrelation
 from .approach import Approach
 from .optimizers import Observer, Progress
-from .problem import FitProblem, expanded_to
+from .parts import expanded_to
+from .problem import FitProblem
 
 FIRST_SIZE, FIRST_LENGTH = 0.5, 0.25  # of ln E; of the extent
 SIZES, LENGTHS = (1e-3, 10.0), (0.1, 10.0)  # that are looked at; lengths of the shortest wave's and of the extent
