@@ -11,6 +11,7 @@
 #include "core/contact/distance_field.h"
 #include "core/contact/plane.h"
 #include "core/contact/rounded_box.h"
+#include "core/contact/rounded_cylinder.h"
 #include "core/contact/sphere.h"
 
 namespace sheetbend {
@@ -20,6 +21,7 @@ using Shapes = std::tuple<  //
     Sphere,                 //
     Capsule,                //
     RoundedBox,             //
+    RoundedCylinder,        //
     DistanceField>;
 
 inline constexpr int shape_count = std::tuple_size_v<Shapes>;

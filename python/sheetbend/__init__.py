@@ -73,7 +73,7 @@ from .report.fit_result import FitResult
 from .report.scores import Score, Scores, coordinate_error, scores
 from .scene.body import Body
 from .scene.body_points import box_corners
-from .scene.colliders import Box, Capsule, Plane, Sphere
+from .scene.colliders import Box, Capsule, Cylinder, Plane, Sphere
 from .scene.distance_field import DistanceField
 from .scene.inertia import Inertia
 from .scene.scene import Scene
@@ -106,6 +106,7 @@ __all__ = [
     "ConfigError",
     "ContactCounts",
     "ContactMode",
+    "Cylinder",
     "DistanceField",
     "DivergenceError",
     "EmptyGradientError",

@@ -9,7 +9,7 @@
 namespace sheetbend::testing {
 namespace {
 
-constexpr double sizes[shape_count][most_sizes] = {{}, {0.8}, {0.5, 0.7}, {0.9, 0.7, 0.5, 0.15}};
+constexpr double sizes[shape_count][most_sizes] = {{}, {0.8}, {0.5, 0.7}, {0.9, 0.7, 0.5, 0.15}, {0.8, 0.5, 0.15}};
 // Near a face, an edge and a corner of the box, and likewise around the others; all below their surface or above.
 constexpr double points[][3] = {
     {0.3, -0.2, 0.45}, {-0.3, 0.3, 0.8}, {0.85, 0.66, 0.1}, {-0.84, 0.6, -0.42}, {0.2, 0.3, -1.0}};
@@ -53,6 +53,11 @@ TEST(Shapes, AreAsFarAsTheyShould) {
   EXPECT_DOUBLE_EQ(far("rounded_box", {1.0, 2.0, 3.0, 0.1}, {4.0, 0.0, 0.0}), 3.0);
   EXPECT_DOUBLE_EQ(far("rounded_box", {1.0, 2.0, 3.0, 0.1}, {0.0, 1.5, 0.0}), -0.5);
   EXPECT_NEAR(far("rounded_box", {1.0, 2.0, 3.0, 0.1}, {3.9, 5.9, 0.0}), 4.9, 1e-14);
+  EXPECT_DOUBLE_EQ(far("rounded_cylinder", {2.0, 3.0, 0.1}, {2.4, 3.2, 0.0}), 2.0);
+  EXPECT_DOUBLE_EQ(far("rounded_cylinder", {2.0, 3.0, 0.1}, {1.2, -0.9, 3.5}), 0.5);
+  EXPECT_DOUBLE_EQ(far("rounded_cylinder", {2.0, 3.0, 0.1}, {0.0, 1.2, 0.5}), -0.8);
+  EXPECT_DOUBLE_EQ(far("rounded_cylinder", {2.0, 3.0, 0.1}, {0.3, 0.4, -2.8}), -0.2);
+  EXPECT_NEAR(far("rounded_cylinder", {2.0, 3.0, 0.1}, {0.0, 4.9, 6.9}), 4.9, 1e-14);
   EXPECT_THROW(shape_of("teapot"), std::invalid_argument);
 }
 

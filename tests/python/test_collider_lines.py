@@ -24,6 +24,7 @@ def scene() -> sb.Scene:
         sb.Plane(normal=(0, 0.1, 1), name="table"),
         sb.Sphere(center=(0, 0, 0.05), radius=0.04, name="ball"),
         bar.moving(TIMES, [[0, 0, 0], [0, 0, 0.03]], [[0, 0, 0], [0, 0, np.pi / 2]]),
+        sb.Cylinder(start=(0.2, 0, 0.02), end=(0.2, 0, 0.05), radius=0.03, edge_radius=0.004, name="plate"),
         sb.Box(center=(0.3, 0, 0.03), size=(0.06, 0.04, 0.02), edge_radius=0.005, name="box"),
     ):
         made.contact(rope, shape, friction=0.3, radius=0.002)
@@ -34,7 +35,7 @@ def test_outlines_lie_on_the_shapes_and_move_with_them() -> None:
     made = scene()
     motion = sb.simulate(made, TIMES, SOLVER)
     lines = collider_lines(made, motion.times, motion.positions)
-    assert list(lines) == ["table", "ball", "bar", "box"]
+    assert list(lines) == ["table", "ball", "bar", "plate", "box"]
     assert lines["table"] @ [0, 0.1, 1] == pytest.approx(0.0, abs=1e-12)
     assert np.ptp(lines["table"][..., 0]) >= 0.25  # as wide as the rope, and no wider for the carried forces
     assert np.abs(lines["table"]).max() < 0.6
@@ -42,6 +43,8 @@ def test_outlines_lie_on_the_shapes_and_move_with_them() -> None:
     assert lines["bar"][0, ..., 1].max() == pytest.approx(0.12)  # with its cap
     assert lines["bar"][1, ..., 0].max() == pytest.approx(0.22)  # turned by a quarter, about its middle
     assert lines["bar"][1, ..., 2].mean() == pytest.approx(0.08)
+    assert np.linalg.norm(lines["plate"][..., :2] - [0.2, 0], axis=-1) == pytest.approx(0.03)
+    assert set(lines["plate"][..., 2].ravel().round(9)) == {0.02, 0.05}
     assert np.ptp(lines["box"][0].reshape(-1, 3), axis=0) == pytest.approx([0.06, 0.04, 0.02])
     assert lines["box"].shape == (2, 12, 2, 3)
     assert set(of_trajectory(made, motion).ticks) == set(lines)

@@ -81,6 +81,13 @@ def test_a_file_builds_the_scene_that_python_builds():
     assert np.array_equal(ours, theirs)
 
 
+def test_a_cylinder_has_ends_a_radius_and_rounded_rims():
+    read = built(DRAGGED.replace('shape = "capsule"', 'shape = "cylinder"\nedge_radius = 0.005'))
+    post = sb.Cylinder(start=[0.1, 0.1, 0], end=[0.1, 0.1, 0.3], radius=0.02, edge_radius=0.005, name="post")
+    assert read.contacts.colliders["post"] == post
+    assert read.quantities["post_edge_radius"].value == 0.005
+
+
 def test_a_rod_touches_as_a_rope_does():
     read, solver = scene_alone(parsed(DRAGGED.replace("[[scene.rope]]", '[[scene.rod]]\nname = "rope"\nGJ = 1e-4')))
     motion = sb.simulate(read, [0.0, 0.05], solver)

@@ -135,6 +135,8 @@ def test_shapes_refuse_what_they_cannot_be():
         lambda: sb.Plane(normal=(0, 0, 0)),
         lambda: sb.Sphere(center=(0, 0, 0), radius=0.0),
         lambda: sb.Capsule(start=(0, 0, 1), end=(0, 0, 1), radius=0.1),
+        lambda: sb.Cylinder(start=(0, 0, 0), end=(0, 0, 0.1), radius=1.0, edge_radius=0.06),
+        lambda: sb.Cylinder(start=(0, 0, 0), end=(0, 0, 0), radius=1.0, edge_radius=0.01),
         lambda: sb.Box(center=(0, 0, 0), size=(1, 1, 0.1), edge_radius=0.06),
         lambda: sb.Plane().moving([0.0, 0.0], np.zeros((2, 3))),
         lambda: sb.Plane().moving([0.0, 1.0], np.zeros((3, 3))),

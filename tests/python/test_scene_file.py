@@ -58,6 +58,8 @@ def touching() -> sb.Scene:
     ball = sb.Sphere((0.1, 0.0, -0.025), 0.03, name="ball").moving([0.0, 0.1], [[0, 0, 0], [0, 0, 0.01]])
     scene.contact(rope, ball, friction=0.2, stiffness=1e3, dissipation=0.3)
     scene.contact(rope.particles[:2], sb.Capsule((0, -1, -0.05), (0, 1, -0.05), 0.02, name="bar"), friction=0.0)
+    plate = sb.Cylinder((0.2, 0, -0.2), (0.2, 0.01, -0.16), 0.05, 0.003, name="plate")
+    scene.contact([4], plate, friction=0.1)
     scene.contact([3], sb.Box((0.2, 0, -0.06), (0.1, 0.1, 0.1), 0.01, name="box"), friction=0.1)
     return scene
 

@@ -7,7 +7,7 @@ from typing import Literal, Self
 
 from pydantic import model_validator
 
-from ..scene.colliders import Box, Capsule, Collider, Plane, Sphere
+from ..scene.colliders import Box, Capsule, Collider, Cylinder, Plane, Sphere
 from ..scene.distance_field import DistanceField
 from .section import Finite, Name, Section, Vector, key
 
@@ -15,6 +15,7 @@ SHAPES: dict[str, type[Collider]] = {
     "plane": Plane,
     "sphere": Sphere,
     "capsule": Capsule,
+    "cylinder": Cylinder,
     "box": Box,
     "mesh": DistanceField,
 }
@@ -31,23 +32,29 @@ def arguments(shape: str) -> dict[str, bool]:
 
 
 class ColliderSection(Section):
-    """A shape that ropes and cloths touch, `sb.Plane`, `sb.Sphere`, `sb.Capsule`, `sb.Box` or a mesh
+    """A shape that ropes and cloths touch, `sb.Plane`, `sb.Sphere`, `sb.Capsule`, `sb.Cylinder`, `sb.Box` or a mesh
     (`sb.DistanceField`), standing, moving at knots or with a tool. A list: [[scene.collider]]. Its quantities are
     <name>_x, <name>_y and <name>_z (m), how far it is from where it was given, and its lengths, such as <name>_radius
     (m)."""
 
     name: Name = key(..., "prefix of its quantities, and what contacts call it")
-    shape: Literal["plane", "sphere", "capsule", "box", "mesh"] = key(
+    shape: Literal["plane", "sphere", "capsule", "cylinder", "box", "mesh"] = key(
         ..., "a plane is solid below, a long capsule a cylinder, a mesh any closed surface from a file"
     )
     point: Vector | None = key(None, "of a plane: a point on it; the origin when left out", "m")
     normal: Vector | None = key(None, "of a plane: to its free side, of any length; up (z) when left out")
     center: Vector | None = key(None, "of a sphere or box", "m")
-    start: Vector | None = key(None, "of a capsule: where its segment starts", "m")
-    end: Vector | None = key(None, "of a capsule: where its segment ends", "m")
-    radius: Finite | None = key(None, "of a sphere or capsule", "m", gt=0)
+    start: Vector | None = key(
+        None, "of a capsule: where its segment starts; of a cylinder: the middle of one flat end", "m"
+    )
+    end: Vector | None = key(
+        None, "of a capsule: where its segment ends; of a cylinder: the middle of the other end", "m"
+    )
+    radius: Finite | None = key(None, "of a sphere, capsule or cylinder", "m", gt=0)
     size: Vector | None = key(None, "of a box: its whole edges, before it is turned", "m")
-    edge_radius: Finite | None = key(None, "of a box: of its rounded edges, below half of the shortest edge", "m", gt=0)
+    edge_radius: Finite | None = key(
+        None, "of a box or cylinder: of its rounded edges, below half of the shortest edge or thickness", "m", gt=0
+    )
     rotation: Vector | None = key(
         None, "of a box or mesh: a vector along the axis that it is turned about, as long as the angle", "rad"
     )

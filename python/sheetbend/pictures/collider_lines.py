@@ -17,7 +17,8 @@ MARGIN = 0.1  # of the motion's extent, by which that grid is larger
 def collider_lines(scene: Scene, times: Array, positions: Array) -> dict[str, Array]:
     """By collider, (frames, lines, 2, 3) m: the ends of short lines that draw it where it is at some times.
 
-    A plane is a grid as wide as the motion, a sphere three circles, a capsule its circles and sides, a box its edges,
+    A plane is a grid as wide as the motion, a sphere three circles, a capsule its circles and sides, a cylinder its
+    ends and sides, a box its edges,
     a distance field sections of its mesh.
 
     Args:
@@ -62,13 +63,20 @@ def _outline(collider: Collider) -> Array:
         half = np.array([sizes[f"half_{axis}"] for axis in "xyz"])
         return half * _edges()
     radius, half_length = sizes["radius"], sizes.get("half_length", 0.0)
+    if collider.shape == "rounded_cylinder":
+        ends = [_circle(radius, 2) + np.array([0.0, 0.0, end]) for end in (-half_length, half_length)]
+        return np.concatenate([*ends, _sides(radius, half_length)])
     parts = [
         _circle(radius, axis) + np.array([0.0, 0.0, end])
         for axis in range(3)
         for end in dict.fromkeys((-half_length, half_length))
     ]
-    sides = [[[radius * np.cos(a), radius * np.sin(a), z] for z in (-half_length, half_length)] for a in AROUND[:-1:3]]
-    return np.concatenate([*parts, np.array(sides)] if half_length else parts)
+    return np.concatenate([*parts, _sides(radius, half_length)] if half_length else parts)
+
+
+def _sides(radius: float, half_length: float) -> Array:
+    ends = (-half_length, half_length)
+    return np.array([[[radius * np.cos(a), radius * np.sin(a), z] for z in ends] for a in AROUND[:-1:3]])
 
 
 def _circle(radius: float, axis: int) -> Array:

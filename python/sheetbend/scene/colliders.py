@@ -1,4 +1,4 @@
-"""Closed shapes that ropes and cloth touch: planes, spheres, capsules and boxes, standing or moving as given."""
+"""Closed shapes that ropes and cloth touch: planes, spheres, capsules, cylinders, boxes; standing or moving."""
 
 from __future__ import annotations
 
@@ -202,8 +202,7 @@ class Capsule(Collider):
 
     @property
     def sizes(self) -> Mapping[str, float]:
-        along = self._vector("end", self.end) - self._vector("start", self.start)
-        return {"radius": float(self.radius), "half_length": 0.5 * float(np.linalg.norm(along))}
+        return {"radius": float(self.radius), "half_length": _half_length(self, self.start, self.end)}
 
     @property
     def half_thickness(self) -> float:
@@ -214,8 +213,52 @@ class Capsule(Collider):
         return sum(self.sizes.values())
 
     def _placed(self) -> tuple[Array, Array]:
-        start, end = self._vector("start", self.start), self._vector("end", self.end)
-        return 0.5 * (start + end), _turn_to(f"{self.name or self.shape}.end", end - start)
+        return _between(self, self.start, self.end)
+
+
+@dataclass(frozen=True)
+class Cylinder(Collider):
+    """A cylinder with rounded rims; a flat one is a plate. As on a box, its rims meet particles, not the links between
+    them.
+
+    Args:
+        start, end: (3,) m, the middles of its two flat ends.
+        radius: m, the quantity `<name>_radius`.
+        edge_radius: m, of its rims; less than the radius and less than half the distance of its ends.
+    """
+
+    shape: ClassVar[str] = "rounded_cylinder"
+    start: ArrayLike
+    end: ArrayLike
+    radius: float
+    edge_radius: float
+
+    def __post_init__(self) -> None:
+        self._placed()
+        self._positive(radius=self.radius, edge_radius=self.edge_radius)
+        if not self.edge_radius < self.half_thickness:
+            problem = "is too large for the cylinder"
+            fix = "give less than its radius and less than half the distance of its ends"
+            raise SceneError(f"{self.name or self.shape}.edge_radius", problem, self.edge_radius, fix)
+
+    @property
+    def sizes(self) -> Mapping[str, float]:
+        return {
+            "radius": float(self.radius),
+            "half_length": _half_length(self, self.start, self.end),
+            "edge_radius": float(self.edge_radius),
+        }
+
+    @property
+    def half_thickness(self) -> float:
+        return min(float(self.radius), _half_length(self, self.start, self.end))
+
+    @property
+    def extent(self) -> float:
+        return float(np.hypot(self.radius, _half_length(self, self.start, self.end)))
+
+    def _placed(self) -> tuple[Array, Array]:
+        return _between(self, self.start, self.end)
 
 
 @dataclass(frozen=True)
@@ -264,6 +307,17 @@ class Box(Collider):
 
     def _placed(self) -> tuple[Array, Array]:
         return self._vector("center", self.center), self._vector("rotation", self.rotation)
+
+
+def _half_length(collider: Collider, start: ArrayLike, end: ArrayLike) -> float:
+    """m, of a shape around a segment."""
+    return 0.5 * float(np.linalg.norm(collider._vector("end", end) - collider._vector("start", start)))
+
+
+def _between(collider: Collider, start: ArrayLike, end: ArrayLike) -> tuple[Array, Array]:
+    """Where the frame of such a shape is: the middle of the segment, its third axis along it."""
+    first, last = collider._vector("start", start), collider._vector("end", end)
+    return 0.5 * (first + last), _turn_to(f"{collider.name or collider.shape}.end", last - first)
 
 
 def _turn_to(field_name: str, axis: Array) -> Array:

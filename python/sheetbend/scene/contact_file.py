@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..errors import SceneError
-from .colliders import Box, Capsule, Collider, Motion, Plane, Sphere
+from .colliders import Box, Capsule, Collider, Cylinder, Motion, Plane, Sphere
 from .contacts import ARRAYS, Contact
 from .scene import Scene
 
@@ -121,6 +121,10 @@ def _capsule(radius: float, half_length: float, **known: Any) -> Collider:
     return Capsule((0.0, 0.0, -half_length), (0.0, 0.0, half_length), radius, **known)
 
 
+def _cylinder(radius: float, half_length: float, edge_radius: float, **known: Any) -> Collider:
+    return Cylinder((0.0, 0.0, -half_length), (0.0, 0.0, half_length), radius, edge_radius, **known)
+
+
 def _box(*lengths: float, **known: Any) -> Collider:
     return Box((0.0, 0.0, 0.0), tuple(2.0 * half for half in lengths[:3]), lengths[3], **known)
 
@@ -130,5 +134,6 @@ _MAKE: dict[str, tuple[tuple[str, ...], Callable[..., Collider]]] = {
     Plane.shape: ((), Plane),
     Sphere.shape: (("radius",), _sphere),
     Capsule.shape: (("radius", "half_length"), _capsule),
+    Cylinder.shape: (("radius", "half_length", "edge_radius"), _cylinder),
     Box.shape: (tuple(Box((0, 0, 0), (1, 1, 1), 0.1).sizes), _box),
 }

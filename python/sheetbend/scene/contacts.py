@@ -163,7 +163,10 @@ class Contacts:
         """The nodes (n, k) of the points of a new contact, of `count` particles in the scene, and its name."""
         if not isinstance(collider, Collider):
             raise SceneError(
-                "contact.collider", "is no shape", collider, "give a Plane, Sphere, Capsule, Box or DistanceField"
+                "contact.collider",
+                "is no shape",
+                collider,
+                "give a Plane, Sphere, Capsule, Cylinder, Box or DistanceField",
             )
         name = name or collider.name or collider.shape
         if any(c.name == name for c in self.contacts):

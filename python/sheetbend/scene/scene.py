@@ -323,7 +323,8 @@ class Scene(SelfTouchingScene):
 
         Args:
             what: a rope, a rod, a cloth, particles (n,), or a body.
-            collider: `Plane`, `Sphere`, `Capsule`, `Box` or `DistanceField`; one object may serve several contacts.
+            collider: `Plane`, `Sphere`, `Capsule`, `Cylinder`, `Box` or `DistanceField`; one object may serve several
+                contacts.
             friction: Coulomb's coefficient (`<name>_friction`); 0 is smooth.
             radius: m, of a rope, or half the thickness of cloth (`<name>_contact_radius` unless zero).
             stiffness: N/m per particle (`<name>_contact_stiffness`). By default rigid: h^2 g/1000 deep under weight.

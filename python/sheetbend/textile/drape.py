@@ -14,11 +14,12 @@ from ..mesh import TriangleMesh, disk
 from ..motion.equilibrium import Equilibrium, NoEquilibriumError, equilibrium
 from ..objects.cloth import add_cloth
 from ..objects.fabric import Fabric
-from ..scene.colliders import Plane
+from ..scene.colliders import Cylinder
 from ..scene.scene import Array, Scene
 from .reading import Reading, combined
 from .shadow import Shadow, shadow
 
+_THICK, _RIM = 0.02, 1e-3  # m, of a plate that the cloth touches, and of its rounded edge
 _SAME = 1e-6  # relative difference in energy below which two states are one, turned or mirrored
 
 
@@ -80,7 +81,7 @@ def drape(
         rings: of the mesh's vertices between center and rim.
         folds: of the starts.
         friction: Coulomb's coefficient of the plates, which the cloth then touches. None = the cloth is held, flat and
-            without slip, which moves the coefficient by less than 0.2 points (docs/fabric.md).
+            without slip, which moves the coefficient by at most 0.3 points (docs/fabric.md).
         cover: whether a second plate lies on the cloth, so that it cannot lift off the one below.
 
     Raises:
@@ -135,9 +136,12 @@ def drape_scene(
         return scene
     cloth = add_cloth(scene, mesh, **fabric.options())
     scene.pin(cloth.particles[mesh.sets["center"]])
-    for name, side in (("plate", 1.0), ("cover", -1.0)) if cover else (("plate", 1.0),):
-        flat = Plane(normal=(0.0, 0.0, side), name=name)
-        scene.contact(cloth.particles[np.setdiff1d(held, mesh.sets["center"])], flat, friction=friction)
+    touching = np.delete(cloth.particles, mesh.sets["center"])
+    flat = float(np.linalg.norm(mesh.vertices[held], axis=1).max())  # its outermost vertices lie on the plates yet
+    for name, low in (("plate", -_THICK), ("cover", 0.0)) if cover else (("plate", -_THICK),):
+        start, end = (0.0, 0.0, low), (0.0, 0.0, low + _THICK)
+        disk = Cylinder(start=start, end=end, radius=flat + _RIM, edge_radius=_RIM, name=name)
+        scene.contact(touching, disk, friction=friction)
     return scene
 
 
