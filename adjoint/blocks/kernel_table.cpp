@@ -1,13 +1,13 @@
 // Compiled once per instruction set, like adjoint/packs/kernel_table.cpp: the kernels of blocks but for those of the kinds.
 #include "adjoint/blocks/block_reverse.h"
 #include "adjoint/blocks/kind_kernels.h"
-#include "adjoint/packs/kernels_by_number.h"
 #include "core/blocks/block_tangents.h"
 #include "core/blocks/potential.h"
+#include "core/constraints/kernels_by_number.h"
 
 using BlockKinds = const sheetbend_blocks::KindKernels* const*;
 #ifdef SHEETBEND_COLD_VARIANT
-extern "C" BlockKinds SHEETBEND_JOIN(sheetbend_block_kinds_, SHEETBEND_COLD_VARIANT)();
+extern "C" BlockKinds SHEETBEND_JOIN(sheetbend_block_kinds_, SHEETBEND_COLD_VARIANT)() noexcept;
 #endif
 
 namespace sheetbend {
@@ -36,12 +36,14 @@ constexpr sheetbend_blocks::Kernels many{ForwardKernels<Pack, Part<&KindKernels:
 }  // namespace sheetbend
 
 #ifdef SHEETBEND_COLD_VARIANT
-extern "C" void SHEETBEND_JOIN(sheetbend_fill_blocks_, SHEETBEND_VARIANT)() {
+extern "C" void SHEETBEND_JOIN(sheetbend_fill_blocks_, SHEETBEND_VARIANT)() noexcept {
   sheetbend::kinds = sheetbend::kernels_by_number<sheetbend::BlockKernels>(
       SHEETBEND_JOIN(sheetbend_block_kinds_, SHEETBEND_COLD_VARIANT)());
 }
 #else
-extern "C" BlockKinds SHEETBEND_JOIN(sheetbend_block_kinds_, SHEETBEND_VARIANT)() { return sheetbend::kinds.data(); }
+extern "C" BlockKinds SHEETBEND_JOIN(sheetbend_block_kinds_, SHEETBEND_VARIANT)() noexcept {
+  return sheetbend::kinds.data();
+}
 #endif
 extern "C" const sheetbend_blocks::Table SHEETBEND_JOIN(sheetbend_blocks_, SHEETBEND_VARIANT){
     sheetbend::one, sheetbend::many,

@@ -1,8 +1,8 @@
 // Compiled once per instruction set, with the namespace `sheetbend` renamed (-Dsheetbend=sheetbend_...): templates and inline functions of two
 // variants are then different functions, and the linker cannot put one in the place of the other. The kernels of each kind are compiled in a unit of
 // their own, which cmake/Kernels.cmake makes from the registry.
-#include "adjoint/packs/kernels_by_number.h"
 #include "adjoint/packs/kind_kernels.h"
+#include "core/constraints/kernels_by_number.h"
 
 extern "C" const sheetbend_blocks::Table SHEETBEND_JOIN(sheetbend_blocks_, SHEETBEND_VARIANT);
 extern "C" const sheetbend_blocks::PotentialKernels SHEETBEND_JOIN(sheetbend_potential_, SHEETBEND_VARIANT);
@@ -12,8 +12,8 @@ extern "C" sheetbend_blocks::FactorUnsymmetric SHEETBEND_JOIN(sheetbend_factor_u
 using sheetbend_packs::KindKernels;
 
 #ifdef SHEETBEND_COLD_VARIANT
-extern "C" const sheetbend_packs::KernelTable* SHEETBEND_JOIN(sheetbend_kernels_, SHEETBEND_COLD_VARIANT)();
-extern "C" void SHEETBEND_JOIN(sheetbend_fill_blocks_, SHEETBEND_VARIANT)();
+extern "C" const sheetbend_packs::KernelTable* SHEETBEND_JOIN(sheetbend_kernels_, SHEETBEND_COLD_VARIANT)() noexcept;
+extern "C" void SHEETBEND_JOIN(sheetbend_fill_blocks_, SHEETBEND_VARIANT)() noexcept;
 #endif
 
 namespace {
@@ -34,7 +34,7 @@ constexpr sheetbend_packs::KernelTable kernels{SHEETBEND_VARIANT_NAME,
 
 }  // namespace
 
-extern "C" const sheetbend_packs::KernelTable* SHEETBEND_JOIN(sheetbend_kernels_, SHEETBEND_VARIANT)() {
+extern "C" const sheetbend_packs::KernelTable* SHEETBEND_JOIN(sheetbend_kernels_, SHEETBEND_VARIANT)() noexcept {
 #ifdef SHEETBEND_COLD_VARIANT
   static const bool filled = [] {
     const auto* cold = SHEETBEND_JOIN(sheetbend_kernels_, SHEETBEND_COLD_VARIANT)();

@@ -5,7 +5,8 @@
 
 #include "core/packs/packed_colors.h"
 
-#define SHEETBEND_DECLARE(variant) extern "C" const sheetbend_packs::KernelTable* sheetbend_kernels_##variant();
+#define SHEETBEND_DECLARE(variant) \
+  extern "C" const sheetbend_packs::KernelTable* sheetbend_kernels_##variant() noexcept;
 SHEETBEND_DECLARE(portable)
 #ifdef SHEETBEND_X86_KERNELS
 SHEETBEND_DECLARE(v3)

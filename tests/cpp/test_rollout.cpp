@@ -13,7 +13,7 @@ TEST_P(RolloutOf, GradientMatchesComplexStep) {
   for (const unsigned seed : {50u, 51u}) {
     const Sample sample = random_scene(seed, GetParam().shape());
     const Program program{sample.scene, make_plan(sample.scene, GetParam().options(2)), 10, 0.004};
-    const SignedSums sums(sample.scene.layout.size, 24);
+    const SignedSums sums(sample.scene.layout.size, 48);
     const auto oracle =
         sums.by_complex_step([&](const std::vector<Complex>& z) { return loss(program, z); }, sample.inputs);
     Layout layout;
