@@ -28,6 +28,17 @@ from .screen import heading, listing
 from .spelling import options
 from .targets import check_targets
 
+ELSEWHERE = {
+    "quaternions": (
+        "poses",
+        "write a script, as experiments/tosses and experiments/elbow have one (docs/bodies.md); or make markers of the "
+        "poses of one motion with sb.Recording.from_poses. Poses of a tool that holds a cloth go with --poses",
+    ),
+    "positions_px": ("pixels", "scale them to m, and save them with sb.Recording.save (docs/recordings.md)"),
+    "force": ("forces", "write a file for `sheetbend textile` or `sheetbend fabric` (docs/tutorials/textile.md)"),
+}
+"""By an array of an archive what it holds beside markers, and where that is taken."""
+
 
 def new(
     files: Annotated[
@@ -177,6 +188,12 @@ def _name(recording: str) -> str:
 
 def _read(file: Path, units: str | None) -> tuple[Recording, str | None]:
     """A recording in m, and the unit that the configuration must name: the one that is given, or one told by doubt."""
-    recording = Recording.load(file, units)
+    try:
+        recording = Recording.load(file, units)
+    except RecordingError as error:
+        for array, (holds, fix) in ELSEWHERE.items():
+            if isinstance(error.got, list) and array in error.got:
+                raise RecordingError(error.field, f"holds {holds}, and no markers over time", error.got, fix) from error
+        raise
     doubt = None if units is not None else unit_doubt(recording)
     return (recording, units) if doubt is None else (Recording.load(file, doubt), doubt)
