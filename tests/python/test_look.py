@@ -391,7 +391,10 @@ def test_nothing_is_written_over(tmp_path: Path) -> None:
         ("branched_cable/data/harness.npz", "branches"),
         ("twin_cloth/data/draped.npz", "one sheet or several"),
         ("tosses/data/flights.npz", "from_poses"),
-        ("elbow/data/flights.npz", "from_poses"),
+        ("elbow/data/flights.npz", "docs/bodies.md"),
+        ("tosses/data/tosses.npz", "experiments/tosses"),
+        ("knit_dic/data/garter_y_dic_frames01_24.npz", "holds pixels"),
+        ("knit_uniaxial/data/garter_x.npz", "sheetbend textile"),
     ],
 )
 def test_what_no_draft_is_for_is_refused_in_a_sentence(tmp_path: Path, file: str, problem: str) -> None:

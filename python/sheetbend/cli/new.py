@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,6 +16,7 @@ from ..files.names import flaw
 from ..files.whole import write_text
 from ..look import garment
 from ..look.draft import Draft, draft
+from ..look.robot import Poses
 from ..look.seen import seen
 from ..look.take import Measured, Take
 from ..recording.recording import Recording
@@ -25,6 +27,17 @@ from .outcome import Json, Outcome, run
 from .screen import heading, listing
 from .spelling import options
 from .targets import check_targets
+
+ELSEWHERE = {
+    "quaternions": (
+        "poses",
+        "write a script, as experiments/tosses and experiments/elbow have one (docs/bodies.md); or make markers of the "
+        "poses of one motion with sb.Recording.from_poses. Poses of a tool that holds a cloth go with --poses",
+    ),
+    "positions_px": ("pixels", "scale them to m, and save them with sb.Recording.save (docs/recordings.md)"),
+    "force": ("forces", "write a file for `sheetbend textile` or `sheetbend fabric` (docs/tutorials/textile.md)"),
+}
+"""By an array of an archive what it holds beside markers, and where that is taken."""
 
 
 def new(
@@ -51,6 +64,10 @@ def new(
     units: Annotated[
         str | None, typer.Option(help="Length unit of the files: m, cm or mm.", show_default=False)
     ] = None,
+    poses: Annotated[
+        Path | None,
+        typer.Option(help="Poses of the robot's tool that holds a cloth: time,x,y,z,qx,qy,qz,qw.", show_default=False),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Look at a recording and write a configuration for `sheetbend fit`.
@@ -61,10 +78,17 @@ def new(
     Example: sheetbend new take.csv --density 0.05
     """
     measured = Measured(density, length)
-    run(lambda console: _new(console, files, output, measured, units), json)
+    run(lambda console: _new(console, files, output, measured, units, poses), json)
 
 
-def _new(console: Console, files: list[Path], output: Path | None, measured: Measured, units: str | None) -> Outcome:
+def _new(
+    console: Console,
+    files: list[Path],
+    output: Path | None,
+    measured: Measured,
+    units: str | None,
+    poses: Path | None,
+) -> Outcome:
     for option, given, fix in (
         ("--density", measured.density, "give kg/m of a rope, kg/m^2 of a cloth"),
         ("--length", measured.length, "give m"),
@@ -72,7 +96,7 @@ def _new(console: Console, files: list[Path], output: Path | None, measured: Mea
         if given is not None and not 0 < given < float("inf"):
             raise ConfigError(option, "must be positive", given, fix)
     if is_mesh := files[0].suffix.lower() in garment.FILES:
-        _check_mesh(files, measured)
+        _check_mesh(files, measured, poses)
         name = _name(files[0].stem)
     else:
         with options(units="--units"):
@@ -89,12 +113,19 @@ def _new(console: Console, files: list[Path], output: Path | None, measured: Mea
         with options(unit="--units"):
             found = garment.draft_of_mesh(files[0], named[0], name, measured, units)
         return _written(console, target, name, found, "the mesh", f"sheetbend simulate {target} --mesh gltf")
+    if poses is not None:
+        if len(files) > 1:
+            raise ConfigError("--poses", "go with one recording", len(files), "make a configuration for each")
+        with options(poses="--poses"):
+            measured = replace(
+                measured, poses=Poses.read(poses, Path(os.path.relpath(poses, target.parent)).as_posix())
+            )
     takes = [Take(seen(r), file, unit) for file, (r, unit) in zip(named, recordings, strict=True)]
     try:
         found = draft(takes, name, measured)
     except RecordingError as error:
-        if error.field == "length":
-            raise ConfigError("--length", error.problem, error.got, error.fix) from error
+        if error.field in ("length", "poses"):
+            raise ConfigError(f"--{error.field}", error.problem, error.got, error.fix) from error
         raise
     return _written(console, target, name, found, "the recording", f"sheetbend fit {target}")
 
@@ -117,8 +148,10 @@ def _written(console: Console, target: Path, name: str, found: Draft, source: st
     return Outcome({"name": name, "config": str(target)} | _said(found) | data)
 
 
-def _check_mesh(files: list[Path], measured: Measured) -> None:
-    """A garment comes in one file, and has no length."""
+def _check_mesh(files: list[Path], measured: Measured, poses: Path | None) -> None:
+    """A garment comes in one file, has no length, and nothing moves it."""
+    if poses is not None:
+        raise ConfigError("--poses", "go with a recording, and the first file is a mesh", str(poses), "leave them out")
     if len(files) > 1:
         raise ConfigError("FILES", "are several, and the first is a mesh", [str(f) for f in files], "give one mesh")
     if measured.length is not None:
@@ -155,6 +188,12 @@ def _name(recording: str) -> str:
 
 def _read(file: Path, units: str | None) -> tuple[Recording, str | None]:
     """A recording in m, and the unit that the configuration must name: the one that is given, or one told by doubt."""
-    recording = Recording.load(file, units)
+    try:
+        recording = Recording.load(file, units)
+    except RecordingError as error:
+        for array, (holds, fix) in ELSEWHERE.items():
+            if isinstance(error.got, list) and array in error.got:
+                raise RecordingError(error.field, f"holds {holds}, and no markers over time", error.got, fix) from error
+        raise
     doubt = None if units is not None else unit_doubt(recording)
     return (recording, units) if doubt is None else (Recording.load(file, doubt), doubt)

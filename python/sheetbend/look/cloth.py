@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ..errors import RecordingError
+from . import robot
 from .cloth_held import SAGS, SIDES, Hold, holds, row_of, slung
 from .cloth_parts import cloth_parts
+from .cloth_sheet import Sheet
+from .cloth_words import lies_over, seen_of, unknown_of
 from .folded import folded
 from .seen import Seen
 from .sheet import flattened, placed, spacing
-from .slung import Slack, slack
+from .slung import slack
 from .take import Description, Measured, Take
 from .text import joined, table
 
@@ -28,37 +31,6 @@ SUBSTEP = 1 / 250  # s, at most
 GUESS = 0.5  # standard deviation of what is assumed without a measurement, relative
 SIZE = 0.01  # standard deviation of the flat size that markers on a stretched cloth show, relative
 FITTED, LONGEST = 2 / 3, 3.0  # share of the time that is fitted, and s at most
-
-
-@dataclass(frozen=True)
-class Sheet:
-    """A cloth as its markers show it.
-
-    Attributes:
-        name: of the cloth in the configuration.
-        own: its markers.
-        flat: (markers, 2) m, where they lie on the fabric.
-        width, height: m.
-        low: (2,) m, from the left and lower edge to the outer markers.
-        origin, axes: (3,) m and (2, 3), where the fabric lies best.
-        held: what holds it.
-        slung: whether it lies between two sides that are held, its x axis from one to the other.
-        slack: what it is without tension, where its motion shows it.
-        wind: (3,) m/s, a guess, where the cloth hangs askew and hardly moves; None elsewhere.
-    """
-
-    name: str
-    own: list[int]
-    flat: Array
-    width: float
-    height: float
-    low: Array
-    origin: Array
-    axes: Array
-    held: list[Hold]
-    slung: bool
-    slack: Slack | None
-    wind: Array | None
 
 
 def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
@@ -84,21 +56,27 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     for name, own in cloths.items():
         sheet = _looked_at(s, name, own, others, density, bars)
         if sheet is None:
-            unknown.append(_lies_over(names, own, "the middle of their cloth is above two of its sides"))
+            unknown.append(lies_over(names, own, "the middle of their cloth is above two of its sides"))
             continue
         sheets.append(sheet)
     pairs = folded(s, [(sheet.own, sheet.flat) for sheet in sheets])
     sides = {k for pair in pairs for k in pair}
     for pair in pairs:
         own = sorted(sheets[pair[0]].own + sheets[pair[1]].own)
-        unknown.append(_lies_over(names, own, "they hang from two rows that face each other, on either side of it"))
+        unknown.append(lies_over(names, own, "they hang from two rows that face each other, on either side of it"))
     sheets = [sheet for k, sheet in enumerate(sheets) if k not in sides]
+    if measured.poses is not None:
+        sheets = [_on_tool(s, sheet, measured.poses) for sheet in sheets]
     for sheet in sheets:
-        notes += _seen_of(s, sheet, len(cloths) > 1)
+        notes += seen_of(s, sheet, len(cloths) > 1)
     if not sheets:
         fix = "measure the fabric between the markers and write the configuration by hand, see docs/configuration.md"
         raise RecordingError("markers", "lie on a cloth that something holds up from below", joined(names), fix)
-    unknown = [*_unknown(s, sheets, measured), *unknown]
+    unknown = [*unknown_of(s, sheets, measured), *unknown]
+    for sheet in sheets:
+        if sheet.ride is not None:
+            more = robot.notes(sheet.ride, sheet.held[0].beyond)
+            notes, unknown = notes + more[0], unknown + more[1]
     used = {k for sheet in sheets for hold in sheet.held for k in hold.markers}
     unused = [k for k in others if k not in used]
     if unused:
@@ -118,102 +96,17 @@ def _bars(sheets: Sequence[Sheet]) -> dict[int, tuple[float, ...]]:
     return {k: tuple(np.median(rows, axis=0).tolist()) for k, rows in shown.items()}
 
 
-def _lies_over(names: Sequence[str], own: Sequence[int], because: str) -> str:
-    return (
-        f"what {joined(names[k] for k in own)} lie over: {because}, and no marker shows how the fabric runs there. "
-        "They are left out; write this cloth by hand, as experiments/twin_cloth does"
-    )
-
-
-def _seen_of(s: Seen, sheet: Sheet, several: bool) -> list[str]:
-    names, held = s.recording.markers, []
-    apart = spacing(s.apart[np.ix_(sheet.own, sheet.own)])
-    whose = f"{sheet.name}: " if several else ""
-    notes = [
-        f"{whose}{len(sheet.own)} markers lie on a sheet, some {1e3 * apart:.3g} mm apart: a cloth of "
-        f"{sheet.width:.3g} x {sheet.height:.3g} m with half of that beyond the outer ones where nothing holds it"
-    ]
-    for hold in sheet.held:
-        of = joined(names[k] for k in hold.markers)
-        what = f"single vertices of the {hold.side} edge" if hold.corners else f"the whole {hold.side} edge"
-        if not hold.own:
-            how = "moves" if hold.moves else "stays in place"
-            held.append(f"on what holds {what} and {how}: {of}")
-        elif hold.corners:
-            how = "move" if hold.moves else "hardly move"
-            held.append(f"{of} {how}, and the {hold.side} row of markers sags between them: the cloth is held there")
-        else:
-            how = "moves: it is taken as what holds the cloth"
-            if not hold.moves:
-                how = "hardly moves: the edge beyond it is taken as held"
-            row = {"top": "upper", "bottom": "lower"}.get(hold.side, hold.side)
-            held.append(f"the {row} row of markers, {of}, {how}")
-    if sheet.slung:
-        held.append("its middle hangs below its left and right edge: it is slung between them")
-    if sheet.slack is not None:
-        held.append(
-            f"its length changes with its sag as that of a fabric of {sheet.slack.length:.4g} m without tension, from "
-            f"the first to the last row, and {sheet.slack.first:.4g} m in the first frame"
-        )
-    if sheet.wind is not None:
-        held.append("it hangs at a slant and hardly moves: a wind blows, or another axis points up")
-    return notes + [whose + words for words in held]
-
-
-def _unknown(s: Seen, sheets: Sequence[Sheet], measured: Measured) -> list[str]:
-    held = [hold for sheet in sheets for hold in sheet.held]
-    windy = any(sheet.wind is not None for sheet in sheets)
-    said = []
-    if any(hold.own and not hold.corners for hold in held):
-        said.append(
-            "what holds the cloth: whole edges are taken. Change the set, or give a grip with the holder's markers"
-        )
-    if any(hold.corners for hold in held):
-        said.append(
-            "how large a patch is held at each corner: one vertex of the mesh is taken, and a cloth that is held at "
-            "single vertices comes out too soft. Measure the patches, and give each set a box (`lower`, `upper`)"
-        )
-    said.append(
-        "the size of the flat fabric: distances are taken as it hangs, stretched by its weight and the air. If that is "
-        "1 %, the lowest markers are off by 1 % of the height, and the fitted tension is too stiff. Measure the edges "
-        "and the markers on the flat cloth, and which way its warp runs, and correct mesh, origin and markers"
-    )
-    if windy:
-        said.append(
-            "how much the cloth is stretched: its flat size along warp and weft is fitted beside the tension, with a "
-            "prior of 1 % about what the markers show. Give the sd of your own measurement where you have one"
-        )
-        said.append(
-            "the stiffness in tension at the start: warp and shear begin at a guess, and the wind's pull shows them"
-        )
-    elif any(sheet.slung for sheet in sheets):
-        said.append(
-            "the stiffness across, in shear and in bending: a slung cloth shows that along its length, which is fitted "
-            "as `..._warp`, whichever way the threads run. It is only as good as the length of the flat fabric, which "
-            "is fitted beside it: an error of 0.2 % is one of 15 to 40 % of the stiffness"
-        )
-    if not windy and not all(sheet.slung for sheet in sheets):
-        said.append("the stiffness in tension: a hanging cloth hardly shows it. warp and shear are not fitted")
-    said.append(
-        "how strongly the air acts at the start: `air_normal` begins with the value of a plate; a steady wind "
-        "shows it only together with the wind's speed"
-        if windy
-        else "the wind: the air is taken to stand still, and `air_tangential`, its friction along the cloth, is a guess"
-    )
-    said.append(
-        "the density: 0.2 kg/m^2 is assumed, and all other values are proportional to it. The intervals allow for 50 % "
-        "of it (`[given]`): measure it, and give --density"
-        if measured.density is None
-        else "the mass of the markers"
-    )
-    if any(hold.moves and hold.own for hold in held):
-        rows = "the upper row's noise" if len(held) == 1 and held[0].side == "top" else "their noise"
-        said.append(
-            f"the true motion of the holder: {rows}, {1e3 * s.noise:.2g} mm in each coordinate, shakes "
-            "the cloth, and the prediction is worse for it. Give the holder's own markers, or its poses as a "
-            '[[scene.tool]]; or add `driven_sigma = "estimate"` to [[recording]], which takes many times as long'
-        )
-    return said
+def _on_tool(s: Seen, sheet: Sheet, poses: robot.Poses) -> Sheet:
+    """A cloth whose upper edge a tool holds and its own upper row shows."""
+    hold, *others = sheet.held
+    if others or not hold.own or hold.corners or not hold.moves:
+        names = [s.recording.markers[k] for h in sheet.held for k in h.markers]
+        fix = "leave out the poses, or write the configuration by hand, as in docs/configuration.md"
+        raise RecordingError("poses", "go with a cloth whose whole upper edge moves", joined(names), fix)
+    below = 0.5 * spacing(s.apart[np.ix_(sheet.own, sheet.own)])
+    ride = robot.riding(s, list(hold.markers), poses)
+    held = [replace(hold, tool=robot.TOOL, beyond=below)]
+    return replace(sheet, height=sheet.height + below, held=held, ride=ride)
 
 
 def _looked_at(
@@ -268,7 +161,10 @@ def _lines(takes: Sequence[Take], sheets: Sequence[Sheet], density: float, measu
     lines = [] if r.gravity is not None else table("[scene]", {"gravity": s.gravity.tolist()})
     solver: dict[str, Any] = {"method": "newton"}
     if not s.static:
-        solver["substeps"] = max(1, int(np.ceil(float(np.median(np.diff(r.times))) / SUBSTEP - 1e-9)))
+        if sheets[0].ride is not None:  # its clock is not that of the frames
+            solver["h"] = 1 / 120
+        else:
+            solver["substeps"] = max(1, int(np.ceil(float(np.median(np.diff(r.times))) / SUBSTEP - 1e-9)))
     lines += table("[solver]", solver)
     winds = [sheet.wind for sheet in sheets if sheet.wind is not None]
     if winds:
@@ -277,7 +173,7 @@ def _lines(takes: Sequence[Take], sheets: Sequence[Sheet], density: float, measu
     for sheet in sheets:
         lines += _cloth(s, sheet, density)
     for take in takes:
-        lines += table("[[recording]]", _recording(take))
+        lines += table("[[recording]]", _recording(take, sheets[0].ride))
     for sheet in sheets:
         lines += _parameters(sheet, density, s.static) + _guesses(sheet, measured, s.static)
     if winds:
@@ -296,13 +192,20 @@ def _cloth(s: Seen, sheet: Sheet, density: float) -> list[str]:
     if not s.static:  # air resists motion across a cloth far more than along it; drag of its particles is alike in both
         cloth |= {"air_normal": AIR, "air_tangential": 0.02}
     cloth |= dict.fromkeys(_sizes(sheet), 1.0)
-    cloth |= {"origin": sheet.origin.tolist(), "x_axis": sheet.axes[0].tolist(), "y_axis": sheet.axes[1].tolist()}
-    cloth["shape"] = "recording" if s.recording.mask[0, sheet.own].all() or s.static else None
+    origin, axes, ahead = sheet.origin, list(sheet.axes), list[str]()
+    if sheet.ride is not None:
+        (hold,), numbers = sheet.held, {k: i for i, k in enumerate(sheet.own)}
+        along = sheet.flat[[numbers[k] for k in hold.markers], 0]
+        origin, *axes, position = robot.placed(sheet.ride, s, along, hold.beyond, sheet.height)
+        ahead, cloth["on_tool"] = robot.lines(sheet.ride, position), robot.TOOL
+    cloth |= {"origin": origin.tolist(), "x_axis": axes[0].tolist(), "y_axis": axes[1].tolist()}
+    through = sheet.ride is None and (s.recording.mask[0, sheet.own].all() or s.static)
+    cloth["shape"] = "recording" if through else None
     pinned, sets, grips = (
         sum(found, list[Any]()) for found in zip(*(h.tables(names, s) for h in sheet.held), strict=True)
     )
     cloth["pinned"] = pinned or None
-    lines = table("[[scene.cloth]]", cloth, {"density": "kg/m^2", "bending": "N m, a guess to start from"})
+    lines = ahead + table("[[scene.cloth]]", cloth, {"density": "kg/m^2", "bending": "N m, a guess to start from"})
     cells = [max(2, round(CELLS * side / max(sheet.width, sheet.height))) for side in (sheet.width, sheet.height)]
     mesh = {"kind": "grid", "width": sheet.width, "height": sheet.height, "nx": cells[0], "ny": cells[1]}
     lines += table("[scene.cloth.mesh]", mesh)
@@ -352,6 +255,9 @@ def _parameters(sheet: Sheet, density: float, static: bool) -> list[str]:
     lines = []
     for name, (lower, upper) in _fitted(sheet, density, static).items():
         lines += table(f"[parameters.{sheet.name}_{name}]", {"lower": lower, "upper": upper})
+    if sheet.ride is not None:
+        prior = [sheet.ride.shift, robot.CLOCK_SD]
+        lines += table(f"[parameters.{robot.CLOCK}]", {"prior": prior}, {"prior": "mean and sd, s"})
     for size in _sizes(sheet):
         lines += table(f"[parameters.{sheet.name}_{size}]", {"prior": [1.0, SIZE]}, {"prior": "mean and sd"})
     return lines
@@ -373,14 +279,16 @@ def _sizes(sheet: Sheet) -> tuple[str, ...]:
     return ("warp_size", "weft_size") if sheet.wind is not None else ("warp_size",) if sheet.slung else ()
 
 
-def _recording(take: Take) -> dict[str, Any]:
+def _recording(take: Take, ride: robot.Riding | None) -> dict[str, Any]:
     s, r = take.seen, take.seen.recording
     entries: dict[str, Any] = {"file": take.file, "units": take.units}
     if s.static:
         return entries | {"static": True, "sigma": max(s.noise, 1e-3 * float(np.nanmax(s.apart)))}
     start, stop = float(r.times[0]), float(r.times[-1])
     last = start + min(FITTED * (stop - start), LONGEST)
-    if s.rest:
+    if ride is not None:
+        entries |= {"time_offset": robot.CLOCK, "start_time": ride.start}
+    if s.rest if ride is None else ride.rests:
         entries["start"] = "equilibrium"
     entries |= {"fit": [start, last], "held_out": [last, min(stop, last + 0.5 * (last - start)) + 1e-3]}
     return entries | {"sigma": max(s.noise, 2e-4)}

@@ -35,6 +35,7 @@ class Hold:
         own: whether these markers are the cloth's own.
         along: m, where they are along the side, in the coordinates of the markers' places; of a holder.
         bar: (3,) direction of the side, where one marker of a holder alone shows where it is.
+        tool: name of the tool that moves it, in place of the markers.
     """
 
     side: str
@@ -45,12 +46,15 @@ class Hold:
     own: bool
     along: tuple[float, ...] = ()
     bar: tuple[float, ...] | None = None
+    tool: str | None = None
 
     def tables(self, names: Sequence[str], s: Seen) -> tuple[list[Any], list[Any], list[Any]]:
         """Sets that are pinned, sets, and grips of a cloth."""
         if not self.corners:
             if not self.moves:
                 return [self.side], [], []
+            if self.tool is not None:
+                return [], [], [{"set": self.side, "tool": self.tool}]
             return [], [], [{"set": self.side, "markers": [names[k] for k in _without_gaps(s, self.markers)]}]
         by_set = {f"{self.side}_{j + 1}": [names[k]] for j, k in enumerate(self.markers)}
         sets = [{"name": name, "markers": markers} for name, markers in by_set.items()]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from .robot import Poses
 from .seen import Seen
 
 
@@ -24,10 +25,12 @@ class Measured:
     Attributes:
         density: kg/m of a rope or beam, kg/m^2 of a cloth.
         length: m, of a rope or beam.
+        poses: of the robot's tool that holds a cloth.
     """
 
     density: float | None = None
     length: float | None = None
+    poses: Poses | None = None
 
 
 class Description(NamedTuple):
