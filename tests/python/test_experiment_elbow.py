@@ -42,3 +42,27 @@ def test_gravity_of_two_flights_is_that_of_the_cube() -> None:
     found = sb.fit([experiment(every[k]) for k in (2, 10)], parameters=parameters(["gravity"]), refine=False)["gravity"]
     assert found.half_width is not None
     assert abs(found.value - 9.64) < found.half_width < 0.2
+
+
+def test_tosses_come_to_rest_nearer_than_without_physics() -> None:
+    from landings import FOUND, errors, halves, of_both, without_physics
+
+    seen, others = halves()
+    assert (len(seen), len(others)) == (30, 30)
+    group = [toss for toss in others if toss.free >= 13]
+    off = np.array([errors(toss, of_both(FOUND)) for toss in group])
+    plain = np.array([without_physics(toss)[1] for toss in group])
+    assert off[:, 0].mean() < 0.5 * plain[:, 0].mean()
+    assert off[:, 1].mean() < 0.6 * plain[:, 1].mean()
+
+
+def test_second_block_starts_beside_the_hinge_of_the_first() -> None:
+    """The middle between the blocks starts where flight shows it, and with its velocity."""
+    from landings import SOLVER, halves, scene_of, start_of
+
+    toss = next(toss for toss in halves()[1] if toss.free >= 13)
+    scene, start = scene_of(toss), start_of(toss)
+    motion = sb.simulate(scene, toss.times[:5], SOLVER)
+    middle = np.mean([scene.bodies[block].pose(motion)[0] for block in ("first", "second")], axis=0)
+    assert middle[0] == pytest.approx(start.middle, abs=1e-12)
+    assert np.abs(middle - toss.middle()[:5]).max() < 1e-3

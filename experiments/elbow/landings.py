@@ -1,0 +1,191 @@
+"""Where two tossed blocks on a hinge come to rest: predictions of tosses that nothing was fitted to.
+
+    python experiments/elbow/landings.py
+
+Each block is a rigid body with eight rounded corners, which touch the table. The numbers of the contact, of the hinge
+and of the moments of inertia are those that `landings_study.py` finds from every other toss. The other tosses are
+predicted from their free flight, beside predictions without physics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import sheetbend as sb
+from blocks import ARM, AXIS, HINGE, MASS, RATE, SIDES, Flight, second_block
+from sheetbend.arrays.rotations import matrices_of, rotation_matrix
+from sheetbend.quantities.quantities import Term
+
+DATA = Path(__file__).parent / "data" / "tosses.npz"
+SCALE = 1.018  # of the data's lengths, from free flight
+DOWN = np.array([0.0, 0.0, -9.81 / SCALE])  # m/s^2 in the unit of the data
+FEWEST = 7  # frames of free flight from which the state at the start is known well
+SOLVER = sb.Solver(h=1 / (8 * RATE), method="implicit")
+TOUCHING = sb.box_corners(SIDES / SCALE)
+BLOCKS = ("first", "second")
+BOX = dict(enumerate(np.diag(sb.Inertia.box(MASS, SIDES / SCALE).matrix).tolist(), start=1))  # kg m^2, homogeneous
+STIFFNESS = 6e4  # N/m, of a corner
+FOUND = {  # of the first block, and alike of the second
+    "first_table_friction": 0.168,
+    "first_table_contact_dissipation": 1.95,  # s/m
+    "rounding": 2.67e-3,  # m
+    "hinge_viscosity": 2.2e-4,  # N m s
+    **{f"first_inertia_{k}": 1.117 * moment for k, moment in BOX.items()},
+}
+
+
+@dataclass(frozen=True)
+class Toss(Flight):
+    """From where the blocks fly freely until they rest; free: frames of free flight."""
+
+    free: int
+
+    def middle(self) -> np.ndarray:
+        """(frames, 3) m, between the centers of the blocks."""
+        return (self.positions + self.second()[0]) / 2.0
+
+
+def tosses() -> list[Toss]:
+    """All of them, in the order of the source."""
+    data = np.load(DATA)
+    x, q, angles = (data[key].astype(float) for key in ("positions", "quaternions", "angles"))
+    ends = zip(data["starts"][:-1], data["starts"][1:], data["toss"], data["free"], strict=True)
+    return [
+        Toss(f"toss {n}", np.arange(b - a) / RATE, x[a:b], q[a:b], angles[a:b], int(free)) for a, b, n, free in ends
+    ]
+
+
+@dataclass(frozen=True)
+class Start:
+    """State at a toss's first frame: what `Scene.add_body` takes of the first block, angle and rate of the hinge, and
+    place and velocity of the middle between the blocks, which alone falls as a point does."""
+
+    body: dict[str, np.ndarray]
+    angle: float
+    rate: float
+    middle: np.ndarray
+    velocity: np.ndarray
+
+
+def start_of(toss: Toss) -> Start:
+    few = slice(0, toss.free)
+    t = toss.times[few]
+    turns = sb.start_of_poses(t, toss.positions[few], toss.quaternions[few], DOWN)
+    spin = np.asarray(turns["spin"])
+    middle, velocity = np.polynomial.polynomial.polyfit(t, toss.middle()[few] - 0.5 * np.outer(t**2, DOWN), 1)
+    angle, rate = np.polynomial.polynomial.polyfit(t, toss.angles[few], 1)
+    frame = np.asarray(turns["rotation"])
+    hinge, arm = frame @ HINGE, frame @ rotation_matrix("angle", angle * np.array(AXIS)) @ ARM
+    swing = np.cross(spin, hinge) + np.cross(spin + rate * (frame @ AXIS), arm)
+    body = {
+        "at": middle - 0.5 * (hinge + arm),
+        "rotation": frame,
+        "velocity": velocity - 0.5 * swing,
+        "spin": spin,
+    }
+    return Start(body, float(angle), float(rate), middle, velocity)
+
+
+def scene_of(toss: Toss) -> sb.Scene:
+    """The blocks that fly from their first frames onto the table. `rounding` is the radius of their corners, m, and
+    `stretch` what lengths are longer than SCALE makes them."""
+    start = start_of(toss)
+    scene = sb.Scene(toss.name, gravity=DOWN)
+    box, at, frame = sb.Inertia.box(MASS, SIDES / SCALE), start.body["at"], start.body["rotation"]
+    centers, turned = second_block(at[None], frame[None], np.array([start.angle]))
+    first = scene.add_body("first", of=box, **start.body)
+    second = scene.add_body("second", of=box, at=centers[0], rotation=turned[0])
+    sb.hinge(first, second, at=at + frame @ HINGE, axis=frame @ AXIS, rate=start.rate, viscosity=1e-4)
+    table = sb.Plane(name="table")
+    for body in (first, second):
+        name = f"{body.name}_table"
+        scene.contact(body, table, friction=0.2, stiffness=STIFFNESS, dissipation=2.0, points=TOUCHING, name=name)
+    scene.add_quantity("rounding", 0.0, "m", positive=False, scale=2e-3, limits=(0.0, 0.02))
+    scene.add_quantity("stretch", 0.0, "", positive=False, scale=0.01)
+    axes = np.arange(4 * 2 * len(TOUCHING)).reshape(-1, 4)[:, 1:].ravel()  # of the weights of the corners' nodes
+    corners = np.tile(TOUCHING.ravel(), 2)
+    rounding, stretch = (("rounding", "identity"),), (("stretch", "identity"),)
+    scene.add_terms(
+        [
+            Term("contact_weight", axes, -np.sign(corners), rounding),
+            Term("contact_radius", np.arange(2), 1.0, rounding),
+            Term("contact_weight", axes, corners, stretch),
+            Term("gravity", 2, DOWN[2], stretch),
+        ]
+    )
+    return scene
+
+
+def other(name: str) -> str:
+    return name.replace("first", "second")
+
+
+def of_both(values: Mapping[str, float]) -> dict[str, float]:
+    """With the second block's numbers, which are those of the first."""
+    return {**values, **{other(name): value for name, value in values.items()}}
+
+
+def errors(toss: Toss, values: Mapping[str, float]) -> np.ndarray:
+    """Of a prediction, means of both blocks: of their centers in mm, mean over time and at rest, and of their attitudes
+    in degrees, likewise."""
+    scene = scene_of(toss)
+    motion = sb.simulate(scene, toss.times, SOLVER, values)
+    found = []
+    for block, (x, frames) in zip(
+        BLOCKS, ((toss.positions, matrices_of(toss.quaternions)), toss.second()), strict=True
+    ):
+        places, axes = scene.bodies[block].pose(motion, values)
+        cosine = (np.einsum("fij,fij->f", axes, frames) - 1.0) / 2.0
+        angle = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+        apart = 1e3 * np.linalg.norm(places - x, axis=1)
+        found.append([apart.mean(), apart[-1], angle.mean(), angle[-1]])
+    return np.mean(found, axis=0)
+
+
+def without_physics(toss: Toss) -> np.ndarray:
+    """The error of the middle, where it lies still from the last frame of free flight, and where it goes on as it flew
+    until it is as low as it rests: two rows."""
+    x, start = toss.middle(), start_of(toss)
+    along = start.middle + np.outer(toss.times, start.velocity) + 0.5 * np.outer(toss.times**2, DOWN)
+    low = along[:, 2] < SIDES[2] / 2 / SCALE
+    stops = int(low.argmax()) if low.any() else len(x) - 1
+    along[stops:] = along[stops]
+    still = x.copy()
+    still[toss.free :] = x[toss.free - 1]
+    return np.array([[a.mean(), a[-1]] for a in (1e3 * np.linalg.norm(way - x, axis=1) for way in (still, along))])
+
+
+def report(label: str, group: list[Toss], values: Mapping[str, float]) -> None:
+    found = np.array([errors(toss, values) for toss in group])
+    mean, middle = found.mean(axis=0), np.median(found, axis=0)
+    print(
+        f"{label}, {len(group)} tosses: centers {mean[0]:.0f} mm over time (median {middle[0]:.0f}), {mean[1]:.0f} at "
+        f"rest ({middle[1]:.0f}); attitudes {mean[2]:.0f} degrees ({middle[2]:.0f}), {mean[3]:.0f} at rest "
+        f"({middle[3]:.0f})",
+        flush=True,
+    )
+
+
+def halves() -> tuple[list[Toss], list[Toss]]:
+    """The tosses that numbers are found from, and those that are predicted."""
+    every = tosses()
+    return every[::2], every[1::2]
+
+
+def main() -> None:
+    seen, rest = halves()
+    values = of_both(FOUND)
+    report("the half that the numbers are from", seen, values)
+    report("others", rest, values)
+    report(f"others with {FEWEST} frames of free flight or more", [t for t in rest if t.free >= FEWEST], values)
+    plain = np.mean([without_physics(toss) for toss in rest], axis=0)
+    guesses = ("lie where they were seen last", "fly on until they are as low as they rest")
+    for label, row in zip(guesses, plain, strict=True):
+        print(f"others without physics, {label}: {row[0]:.0f} mm over time, {row[1]:.0f} at rest")
+
+
+if __name__ == "__main__":
+    main()
