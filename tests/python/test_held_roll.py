@@ -10,6 +10,9 @@ import pytest
 import sheetbend as sb
 import tomli_w
 from sheetbend.config import build, parse
+from sheetbend.doubts.spin import spins_otherwise
+from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.statistics.identifiability import Identifiability
 
 Array = np.ndarray
 STRAND: dict[str, Any] = {"length": 0.5, "segments": 16, "density": 0.05, "EI": 5e-3, "drag_linear": 0.4}
@@ -83,7 +86,8 @@ def taken(held: bool) -> sb.Recording:
     return sb.Recording(x, t, name="take")
 
 
-def whirling(times: Array, hand: Array, held: bool) -> sb.Scene:
+def whirling(times: Array, hand: Array, held: bool, marker: str | None = None) -> sb.Scene:
+    """The model of it; with a marker the hand's motion is a recorded one, which a fit may correct."""
     scene = sb.Scene("whirl")
     sb.add_rod(
         scene,
@@ -95,7 +99,11 @@ def whirling(times: Array, hand: Array, held: bool) -> sb.Scene:
         hold_roll=("start",) if held else (),
         **STRAND | {"EI": 2e-3, "drag_linear": 0.01},
     )
-    scene.drive(scene.ropes["rod"].particles[:1], times, hand[:, None])
+    particles = scene.ropes["rod"].particles[:1]
+    if marker is None:
+        scene.drive(particles, times, hand[:, None])
+    else:
+        scene.follow(particles, times, hand[:, None], [marker])
     return scene
 
 
@@ -116,3 +124,17 @@ def test_a_spin_that_is_told_wrong_makes_the_damping_doubtful(true: bool, told: 
         assert found.verdict == "doubtful"
         assert "seems to be held otherwise at its start" in found.words
         assert ("give it hold_roll" if true else "remove it from hold_roll") in found.words
+
+
+@pytest.mark.parametrize(("held", "words"), [(True, "does not spin (hold_roll)"), (False, "may spin")])
+def test_a_spin_that_is_not_asked_beside_corrections_is_a_warning(held: bool, words: str) -> None:
+    recording = taken(held)
+    scene = whirling(recording.times, recording.positions[:, 0], held, recording.markers[0])
+    markers = [None, *map(sb.on_particle, scene.ropes["rod"].particles[2::2])]
+    solver = sb.Solver(h=1 / 500)
+    e = sb.Experiment(scene=scene, recording=recording, markers=markers, solver=solver, sigma=2e-4, driven_sigma=2e-4)
+    nothing = Identifiability((), (), 0, np.zeros(0), (), 1.0)
+    problem = FitProblem([e], as_parameters(["rod_EI"], [e]))
+    doubts, warnings = spins_otherwise(problem, problem.parameters.initial(), nothing)
+    assert doubts == {}
+    assert len(warnings) == 1 and words in warnings[0] and "rod" in warnings[0] and "at its start" in warnings[0]

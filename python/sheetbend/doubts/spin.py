@@ -60,7 +60,8 @@ def turning_ends(e: Experiment) -> Iterator[TurningEnd]:
 
 def spins_otherwise(problem: FitProblem, u: Array, judged: Identifiability) -> tuple[dict[str, str], tuple[str, ...]]:
     """By free parameter, why it is doubtful whether the rods of its motion spin where they are held, and warnings of
-    the same. Takes up to five simulations, four of them with a Jacobian, for motions that have such an end.
+    the same. Takes up to five simulations, four of them with a Jacobian, for motions that have such an end. Where
+    driven markers are corrected (`driven_sigma`), it is not asked, and a warning says so.
 
     Args:
         problem: as it was fitted.
@@ -69,7 +70,9 @@ def spins_otherwise(problem: FitProblem, u: Array, judged: Identifiability) -> t
     """
     ends = {i: list(turning_ends(e)) for i, e in enumerate(problem.experiments) if not e.static}
     ends = {i: found for i, found in ends.items() if found}
-    if not ends or problem.estimates_corrections:
+    if problem.estimates_corrections:
+        return {}, tuple(dict.fromkeys(_not_asked(end) for known in ends.values() for end in known))
+    if not ends:
         return {}, ()
     other = problem.of([_otherwise(e, ends.get(i, [])) for i, e in enumerate(problem.experiments)])
     ok, r, J = problem.evaluate(u)
@@ -131,6 +134,14 @@ def _reached(other: FitProblem, u: Array, J: Array) -> tuple[Array, Array] | Non
     except SheetbendError:
         return None
     return at, r
+
+
+def _not_asked(end: TurningEnd) -> str:
+    held = "may spin" if end.spins else "does not spin (hold_roll)"
+    return (
+        f"{end.rod} {held} about its own axis at its {end.end} in this model. With driven_sigma the fit does not "
+        "examine what the other choice would change, most of all in a damping: look at what holds it"
+    )
 
 
 def _words(end: TurningEnd, name: str, value: str, less: float) -> str:
