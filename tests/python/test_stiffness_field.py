@@ -117,6 +117,17 @@ def test_a_smooth_field_is_found_with_the_size_of_its_prior() -> None:
     assert "given" in stiff.report()
 
 
+def test_a_plan_counts_the_field() -> None:
+    """A stiffness that may vary leaves its mean less certain, and the modes are predicted under their prior."""
+    e = experiment(seen(np.full(len(CLUSTERS), 1e5)))
+    plain = sb.identify(e, parameters=["toy_E"], suggest=False)
+    plan = sb.identify(e, parameters=["toy_E"], smooth={"toy_stiffness": sb.Smooth(size=0.3)}, suggest=False)
+    found = {estimate.name: estimate for estimate in plan.estimates}
+    assert set(found) == {"toy_E", *(f"toy_stiffness_{k}" for k in range(1, 7))}
+    assert found["toy_E"].half_width > 1.5 * plain.estimates[0].half_width
+    assert all(0.0 < found[f"toy_stiffness_{k}"].half_width < 2.5 * 0.3 for k in range(1, 7))
+
+
 def test_what_fits_no_field_is_refused() -> None:
     e = experiment(seen(np.full(len(CLUSTERS), 1e5)), 3)
     wanted = as_parameters(["toy_E"], [e])

@@ -12,6 +12,7 @@ import typer
 from rich.console import Console, Group
 
 from ..config import Config, Study, build, parse, scene_alone
+from ..config.build import smooth_fields
 from ..config.start_values import fields_of_parameter
 from ..errors import ConfigError, InputError
 from ..experiment.experiment import Experiment
@@ -121,6 +122,7 @@ def _identify(
         noise=noise,
         autocorrelation=autocorrelation,
         instead=instead,
+        smooth=smooth_fields(config),
         threads=config.fit.threads,
     )
     show(console, lambda: _rich(plan), plan.report)

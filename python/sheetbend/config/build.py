@@ -64,7 +64,7 @@ class Study:
             "tolerance": fit.tolerance,
             "refine": self._refinement,
             "given": {name: section.sd for name, section in self.config.given.items()},
-            "smooth": {name: Smooth(s.size, s.length) for name, s in self.config.smooth.items()},
+            "smooth": smooth_fields(self.config),
             "profiles": fit.profiles,
             "bootstrap": fit.bootstrap,
             "leave_one_out": fit.leave_one_out,
@@ -79,6 +79,11 @@ class Study:
         meshed = fit.double_segments is not False and bool(scene.strands or scene.cloth)
         finer = (lambda: build(self.config, self.folder, finer=2).experiments) if meshed else None
         return Refinement(halve_step=fit.halve_step, finer=finer, linear=fit.linear_refits or not fit.double_segments)
+
+
+def smooth_fields(config: schema.Config) -> dict[str, Smooth]:
+    """The argument `smooth` of `sb.fit` and `sb.identify`."""
+    return {name: Smooth(section.size, section.length) for name, section in config.smooth.items()}
 
 
 def build(config: schema.Config, folder: Path, finer: int = 1) -> Study:
@@ -107,7 +112,7 @@ def build(config: schema.Config, folder: Path, finer: int = 1) -> Study:
         with located("parameters"):
             wanted = as_parameters(parameters, experiments)
         with located("smooth", "smooth"):
-            with_fields(wanted, experiments, study.options["smooth"])
+            with_fields(wanted, experiments, smooth_fields(config))
     return study
 
 

@@ -23,6 +23,7 @@ from ..errors import InputError, SheetbendError
 from ..experiment.experiment import Experiment
 from ..minimum.growth import growths, in_words
 from ..minimum.problem import FitProblem, ParameterLike, as_parameters
+from ..minimum.smooth import Smooth, with_fields
 from ..optional import require
 from ..quantities.parameters import Parameters
 from ..recording.recording import Recording
@@ -91,6 +92,7 @@ def identify(
     noise: float | None = None,
     autocorrelation: float = 0.0,
     instead: Mapping[str, Sequence[Experiment]] | None = None,
+    smooth: Mapping[str, Smooth] | None = None,
     suggest: bool = True,
     threads: int = 1,
     **experiment: Any,
@@ -106,6 +108,8 @@ def identify(
             right; 0 for independent ones.
         instead: other plans to compare with, by what is changed in words, such as the same experiments with a mass
             hung on.
+        smooth: fields of stiffness, as `fit` takes them. A size or length that `Smooth` does not give cannot be found
+            without data: 0.5 and a quarter of the solid's extent are taken.
         suggest: also predict what a further marker, a force sensor, the same recordings once more, or each parameter
             measured to 1 % would give.
         threads: over experiments and Jacobian columns.
@@ -117,7 +121,8 @@ def identify(
     """
     require("scipy.special", "fit")
     experiments = _planned(scene, recording, experiment)
-    wanted, expected = as_parameters(parameters, experiments), _Noise(noise, autocorrelation)
+    wanted, _ = with_fields(as_parameters(parameters, experiments), experiments, smooth or {})
+    expected = _Noise(noise, autocorrelation)
     found = _Predicted(experiments, wanted, expected, threads)
     variants = []
     for name, others in (instead or {}).items():
