@@ -243,6 +243,7 @@ class Bent:
     def __init__(self, shift: float) -> None:
         self.shift, self.parameters = shift, Parameters([Parameter(name=n, initial=0.0) for n in ("moved", "bent")])
         self.experiments, self.core, self.jacobians = (), SimpleNamespace(data_rows=3, rows=3), 0
+        self.estimates_corrections = False
 
     def evaluate(self, u: np.ndarray, jacobian: bool = True) -> tuple[bool, np.ndarray, np.ndarray]:
         self.jacobians += jacobian

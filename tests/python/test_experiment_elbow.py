@@ -45,7 +45,7 @@ def test_gravity_of_two_flights_is_that_of_the_cube() -> None:
 
 
 def test_tosses_come_to_rest_nearer_than_without_physics() -> None:
-    from landings import FOUND, errors, halves, of_both, without_physics
+    from block_landings import FOUND, errors, halves, of_both, without_physics
 
     seen, others = halves()
     assert (len(seen), len(others)) == (30, 30)
@@ -58,7 +58,7 @@ def test_tosses_come_to_rest_nearer_than_without_physics() -> None:
 
 def test_second_block_starts_beside_the_hinge_of_the_first() -> None:
     """The middle between the blocks starts where flight shows it, and with its velocity."""
-    from landings import SOLVER, halves, scene_of, start_of
+    from block_landings import SOLVER, halves, scene_of, start_of
 
     toss = next(toss for toss in halves()[1] if toss.free >= 13)
     scene, start = scene_of(toss), start_of(toss)

@@ -141,9 +141,8 @@ class FitProblem:
     @cached_property
     def coordinates(self) -> Coordinates:
         """In which a search takes its steps."""
-        return Coordinates(
-            self.parameters, [s for e in self.experiments for s in sums_of(e.scene, self._keys(e), self.parameters)]
-        )
+        sums = [s for e in self.experiments for s in sums_of(e.scene, self._keys(e), self.parameters)]
+        return Coordinates(self.parameters, sums)
 
     def known(self, u: np.ndarray) -> tuple[np.ndarray, list[list[int]], dict[int, tuple[str, float]]]:
         """All values at u, where each experiment's quantities are among them, and by place the parameter that is there:

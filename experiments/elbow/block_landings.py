@@ -1,9 +1,9 @@
 """Where two tossed blocks on a hinge come to rest: predictions of tosses that nothing was fitted to.
 
-    python experiments/elbow/landings.py
+    python experiments/elbow/block_landings.py
 
 Each block is a rigid body with eight rounded corners, which touch the table. The numbers of the contact, of the hinge
-and of the moments of inertia are those that `landings_study.py` finds from every other toss. The other tosses are
+and of the moments of inertia are those that `block_landings_study.py` finds from every other toss. The other tosses are
 predicted from their free flight, beside predictions without physics.
 """
 

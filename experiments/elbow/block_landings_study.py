@@ -1,7 +1,7 @@
 """What contacts tell of two tossed blocks on a hinge: a fit to the first frames after contact, and a search over whole
-paths, which finds the numbers of `landings.py`.
+paths, which finds the numbers of `block_landings.py`.
 
-    python experiments/elbow/landings_study.py [fit | search]
+    python experiments/elbow/block_landings_study.py [fit | search]
 
 Both see every other toss that has seven frames of free flight or more. The fit takes one minute of processor time, the
 search as long.
@@ -13,8 +13,8 @@ import sys
 
 import numpy as np
 import sheetbend as sb
+from block_landings import BLOCKS, BOX, FEWEST, SCALE, SOLVER, Toss, errors, halves, of_both, other, scene_of
 from blocks import CORNERS
-from landings import BLOCKS, BOX, FEWEST, SCALE, SOLVER, Toss, errors, halves, of_both, other, scene_of
 from scipy.optimize import minimize
 from sheetbend.arrays.rotations import quaternions_of
 
