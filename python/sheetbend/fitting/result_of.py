@@ -22,8 +22,9 @@ from ..doubts.unexplained import unexplained
 from ..experiment.clock import outside, told_clocks
 from ..minimum.continuity import shot_motions
 from ..minimum.counts import counted
+from ..minimum.field_fits import field_fits
 from ..minimum.fine_meshes import at_the_limit
-from ..minimum.smooth import Field, field_fits
+from ..minimum.smooth import Field
 from ..report.fit_result import FitResult
 from .conclusion import Conclusion
 from .reached import Reached

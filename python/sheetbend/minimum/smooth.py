@@ -20,7 +20,6 @@ from ..errors import InputError
 from ..experiment.experiment import Experiment
 from ..objects.stiffness_field import StiffnessField
 from ..quantities.parameters import Parameter, Parameters
-from ..result.field import FieldFit
 from ..statistics.covariance import autocorrelation
 from .approach import Approach
 from .optimizers import Observer, Progress
@@ -34,7 +33,7 @@ FINER = 4  # times closer, about the best
 ROUNDS, STEPS, TOLERANCE = 12, 20, 1e-3  # of priors, of the walk with each, and of the cost there
 SETTLED = 0.03  # of the logarithms of both
 LIKELY = 3.841  # of twice the logarithm of a likelihood: 95 % of a chi-square with one degree
-Z = 1.96
+POSSIBLE = 25.0  # likewise: what is less likely weighs less than 4e-6
 
 
 @dataclass(frozen=True)
@@ -67,6 +66,10 @@ class Field:
     length: float
     size_ends: tuple[float | None, float | None] = (None, None)
     length_ends: tuple[float | None, float | None] = (None, None)
+
+    def at(self, log_size: float, log_length: float) -> Field:
+        """With another size and length."""
+        return replace(self, size=math.exp(log_size), length=math.exp(log_length))
 
     def carried(self, parameters: Parameters) -> Parameters:
         """The parameters with this prior."""
@@ -132,7 +135,7 @@ def settled(
             if walk.promised < TOLERANCE:
                 break
         u = walk.u
-        picture = _Picture.at(problem, u, found)
+        picture = Picture.at(problem, u, found)
         if picture is None:
             break
         before = found
@@ -148,51 +151,12 @@ def settled(
     return wanted, here, found
 
 
-def field_fits(problem: FitProblem, u: Array, fields: Sequence[Field]) -> tuple[FieldFit, ...]:
-    """What a fit that ended at u (free,) found of its fields."""
-    picture = _Picture.at(problem, u, fields) if fields else None
-    if picture is None:
-        return ()
-    R = np.asarray(np.linalg.qr(picture.rows_with(fields), mode="r"))[: len(u), : len(u)]
-    spread = np.linalg.pinv(R)  # rows (free,): covariance = spread spread'
-    columns, values, found = {name: k for k, name in enumerate(problem.parameters.free)}, dict[str, float](), []
-    values = problem.parameters.to_physical(u)
-    for field in fields:
-        modes = field.modes
-        mine = [columns[name] for name in modes.modes]
-        about = modes.shapes @ spread[mine]
-        whole = about + (spread[columns[modes.stiffness]] if modes.stiffness in columns else 0.0)
-        prior = np.sum((modes.shapes * modes.deviations(field.size, field.length)) ** 2, axis=1)
-        mean = values.get(modes.stiffness, _given(problem, modes.stiffness))
-        E = mean * np.exp(modes.shapes @ u[mine])
-        found.append(
-            FieldFit(
-                name=modes.name,
-                size=field.size,
-                size_lower=field.size_ends[0],
-                size_upper=field.size_ends[1],
-                length=field.length,
-                length_lower=field.length_ends[0],
-                length_upper=field.length_ends[1],
-                centers=tuple((float(x), float(y), float(z)) for x, y, z in modes.centers),
-                stiffness=tuple(E.tolist()),
-                half_widths=tuple((Z * np.sqrt(np.sum(whole**2, axis=1))).tolist()),
-                left=tuple((np.sum(about**2, axis=1) / np.maximum(prior, 1e-300)).tolist()),
-            )
-        )
-    return tuple(found)
-
-
-def _given(problem: FitProblem, name: str) -> float:
-    return next(float(e.scene.quantities[name].value) for e in problem.experiments if name in e.scene.quantities)
-
-
 def _apart(a: Field, b: Field) -> float:
     return max(abs(math.log(b.size / a.size)), abs(math.log(b.length / a.length)))
 
 
 @dataclass(frozen=True)
-class _Picture:
+class Picture:
     """The least-squares problem to first order, without the fields' priors, in units of the residuals' own size.
 
     Attributes:
@@ -206,7 +170,7 @@ class _Picture:
     u: Array
 
     @classmethod
-    def at(cls, problem: FitProblem, u: Array, fields: Sequence[Field]) -> _Picture | None:
+    def at(cls, problem: FitProblem, u: Array, fields: Sequence[Field]) -> Picture | None:
         """None where the problem has no answer."""
         ok, r, J = problem.evaluate(u)
         if not ok:
@@ -238,6 +202,13 @@ class _Picture:
             below.append(rows)
         return np.concatenate([self.triangle, *below])
 
+    def solved(self, fields: Sequence[Field]) -> tuple[Array, Array]:
+        """The step to the minimum (free,), and a root (free, free) of the covariance there: root root'."""
+        R = np.asarray(np.linalg.qr(self.rows_with(fields), mode="r"))
+        p = len(self.u)
+        root = np.linalg.pinv(R[:p, :p])
+        return -root @ R[:p, -1], root
+
     def deviance(self, fields: Sequence[Field]) -> float:
         """Minus twice the logarithm of the marginal likelihood, up to a constant."""
         R = np.asarray(np.linalg.qr(self.rows_with(fields), mode="r"))
@@ -247,23 +218,39 @@ class _Picture:
         spread = sum(float(np.log(f.modes.deviations(f.size, f.length)).sum()) for f in fields)
         return float(np.sum(R[p:, -1] ** 2)) + 2.0 * (float(np.log(size[known]).sum()) + spread)
 
+    def heights(self, fields: Sequence[Field], i: int, size: Array, length: Array) -> Array:
+        """(sizes, lengths) the deviance of the logarithms of both, of one field."""
+
+        def at(s: float, t: float) -> float:
+            return self.deviance([*fields[:i], fields[i].at(s, t), *fields[i + 1 :]])
+
+        return np.array([[at(s, t) for t in length] for s in size])
+
+    def possible(self, fields: Sequence[Field], i: int) -> tuple[tuple[Field, ...], Array]:
+        """One field with each size and length that is possible, and their probabilities, which sum to one.
+
+        Before the recordings all logarithms that are looked at are as probable.
+        """
+        size, length = _looked_at(fields[i])
+        over = self.heights(fields, i, size, length)
+        over -= over.min()
+        size, length = _narrowed(size, over.min(axis=1)), _narrowed(length, over.min(axis=0))
+        over = self.heights(fields, i, size, length)
+        over -= over.min()
+        rows, columns = np.nonzero(over < POSSIBLE)
+        weights = np.exp(-0.5 * over[rows, columns])
+        each = tuple(fields[i].at(s, t) for s, t in zip(size[rows], length[columns], strict=True))
+        return each, np.asarray(weights / weights.sum())
+
     def likeliest(self, fields: Sequence[Field], i: int) -> Field:
         """One field with the size and the length that are most likely, and their intervals."""
         field = fields[i]
-        modes, given = field.modes, field.wanted
-        wave = 1.0 / math.sqrt(max(float(modes.eigenvalues[-1]), 1e-300))
-        size = _spaced(*SIZES) if given.size is None else np.array([math.log(given.size)])
-        span = (LENGTHS[0] * wave, LENGTHS[1] * modes.extent)
-        length = _spaced(*span) if given.length is None else np.array([math.log(given.length)])
-
-        def at(s: float, t: float) -> float:
-            trial = replace(field, size=math.exp(s), length=math.exp(t))
-            return self.deviance([*fields[:i], trial, *fields[i + 1 :]])
-
-        heights = np.array([[at(s, t) for t in length] for s in size])
+        given = field.wanted
+        size, length = _looked_at(field)
+        heights = self.heights(fields, i, size, length)
         best = np.unravel_index(int(np.argmin(heights)), heights.shape)
         near = [_about(axis, int(k)) for axis, k in zip((size, length), best, strict=True)]
-        finer = np.array([[at(s, t) for t in near[1]] for s in near[0]])
+        finer = self.heights(fields, i, *near)
         row, column = np.unravel_index(int(np.argmin(finer)), finer.shape)
         least = float(finer[row, column])
         return replace(
@@ -273,6 +260,22 @@ class _Picture:
             size_ends=(None, None) if given.size is not None else _ends(size, heights.min(axis=1) - least),
             length_ends=(None, None) if given.length is not None else _ends(length, heights.min(axis=0) - least),
         )
+
+
+def _looked_at(field: Field) -> tuple[Array, Array]:
+    """Logarithms of sizes and of lengths; one of what is given."""
+    modes, given = field.modes, field.wanted
+    wave = 1.0 / math.sqrt(max(float(modes.eigenvalues[-1]), 1e-300))
+    span = (LENGTHS[0] * wave, LENGTHS[1] * modes.extent)
+    size = _spaced(*SIZES) if given.size is None else np.array([math.log(given.size)])
+    return size, _spaced(*span) if given.length is None else np.array([math.log(given.length)])
+
+
+def _narrowed(axis: Array, over: Array) -> Array:
+    """As many points of an axis, closer about those that are possible by their profile over its least."""
+    inside = np.flatnonzero(over < POSSIBLE)
+    first, last = max(int(inside[0]) - 1, 0), min(int(inside[-1]) + 1, len(axis) - 1)
+    return np.linspace(axis[first], axis[last], len(axis))
 
 
 def _spaced(lower: float, upper: float) -> Array:

@@ -19,8 +19,10 @@ class FieldFit:
         length_lower, length_upper: likewise.
         centers: m, of the clusters at rest.
         stiffness: Pa, of each cluster.
-        half_widths: of ln E of each cluster, 95 %, with the prior.
-        left: of each cluster, the share of the prior's variance of ln E about its mean that the data leave.
+        half_widths: of ln E of each cluster, 95 %, with the prior. They count the uncertainty of a size and a length
+            that were found.
+        left: of each cluster, the share of the prior's variance of ln E about its mean that the data leave, on average
+            over the sizes and lengths that are possible.
     """
 
     name: str
