@@ -45,6 +45,7 @@ def what_touches(problem: FitProblem, u: Array) -> tuple[ContactFit, ...]:
                     bdf1=counts.bdf1_share,
                     settled=0 if start is None else start.particles,
                     settled_by=0.0 if start is None else start.farthest,
+                    deepest=counts.deepest,
                 )
             )
     return tuple(rows)
