@@ -104,9 +104,14 @@ def test_the_report_tells_what_touches_and_where_motions_have_kinks() -> None:
     assert touch.began >= 11 and touch.began - touch.ended == 11  # it falls on the table
     assert touch.sliding + touch.sticking == pytest.approx(1.0)
     assert 0.3 < touch.sliding < 0.9
+    assert 0.3e-7 < touch.deepest < 1e-6  # 3.9e-8 m at rest
     assert kinks.name == "table_friction" and kinks.stick > 0 and kinks.begin == kinks.end == 0
     report = result.report()
-    assert "11 of 12" in report and "not looked for in motions with contacts" in " ".join(report.split())
+    assert (
+        "11 of 12" in report
+        and "< 0.001 mm" in report
+        and "not looked for in motions with contacts" in " ".join(report.split())
+    )
     assert sb.FitResult.from_dict(result.to_dict()) == result
 
 

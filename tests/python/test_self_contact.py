@@ -95,6 +95,7 @@ def test_momentum_is_kept(friction: float):
         assert 0 < pairs.most < 2 * len(scene.contacts.pieces) * 6
         assert pairs.began >= pairs.most and pairs.ended > 0
         assert pairs.sliding_share + pairs.sticking_share == pytest.approx(1.0, abs=1e-12)
+        assert pairs.deepest is None
 
 
 def on_a_slope(friction: float) -> sb.Scene:

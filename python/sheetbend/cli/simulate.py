@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ from ..experiment.experiment import Experiment
 from ..experiment.force_readings import sensor_readings
 from ..files.door import reading
 from ..files.whole import written
+from ..motion.depth import too_deep
 from ..motion.equilibrium import equilibrium
 from ..motion.simulate import Trajectory
 from ..motion.simulate import simulate as run_simulation
@@ -167,6 +169,9 @@ def _files(task: Task, folder: Path, mesh: MeshFormat | None) -> list[Path]:
 
 def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None, movie: Path | None) -> dict[str, Any]:
     motion = motion_of(task)
+    depths = {contact: counts.deepest for contact, counts in motion.contacts.items() if counts.deepest is not None}
+    for words in too_deep(task.scene, None, depths):
+        warnings.warn(f"in the motion of {task.name} {words}", stacklevel=2)
     path = folder / f"{task.name}.npz"
     arrays: dict[str, Any] = {f"force_{group}": values for group, values in motion.forces.items()}
     arrays |= {f"pressure_{name}": values for name, values in motion.pressures.items()}
@@ -191,6 +196,7 @@ def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None, mo
         "largest_displacement": float(moved.max()),
         "largest_speed": float(np.linalg.norm(motion.velocities, axis=2).max()),
         "largest_force": {group: float(np.abs(values).max()) for group, values in motion.forces.items()},
+        "deepest": depths,
         **more,
     }
     told = (

@@ -16,6 +16,7 @@ from ..arrays.timeseries import Array
 from ..errors import DivergenceError, UnbalancedError
 from ..minimum.problem import FitProblem
 from ..motion.contact_counts import ContactMode
+from ..motion.depth import too_deep
 from ..motion.simulate import Trajectory, simulate
 from ..result.result import ContactFit, Estimate, Kinks
 from ..statistics.gauge import RANK_TOLERANCE
@@ -45,9 +46,20 @@ def what_touches(problem: FitProblem, u: Array) -> tuple[ContactFit, ...]:
                     bdf1=counts.bdf1_share,
                     settled=0 if start is None else start.particles,
                     settled_by=0.0 if start is None else start.farthest,
+                    deepest=counts.deepest,
                 )
             )
     return tuple(rows)
+
+
+def pressed_in(problem: FitProblem, u: Array, contacts: Sequence[ContactFit]) -> tuple[str, ...]:
+    """A warning for every rigid contact of `what_touches` at u (free,) that did not hold what it touches."""
+    return tuple(
+        f"in the motion of {e.name} {words}"
+        for e in problem.experiments
+        if (depths := {c.contact: c.deepest for c in contacts if c.recording == e.name})
+        for words in too_deep(e.scene, problem.values_of(e, u), depths)
+    )
 
 
 def kinks(problem: FitProblem, u: Array, estimates: Sequence[Estimate]) -> tuple[Kinks, ...]:

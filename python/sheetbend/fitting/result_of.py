@@ -17,7 +17,7 @@ from ..doubts.misread import misread
 from ..doubts.prediction import Comparison
 from ..doubts.profiles import Elsewhere
 from ..doubts.stationary import unfinished
-from ..doubts.touching import kinks, what_touches
+from ..doubts.touching import kinks, pressed_in, what_touches
 from ..doubts.unexplained import unexplained
 from ..experiment.clock import outside, told_clocks
 from ..minimum.continuity import shot_motions
@@ -95,10 +95,12 @@ def result_of(
     evaluations, jacobians = sum(m.evaluations for m in ends), sum(m.jacobians for m in ends)
     all_evaluations, all_jacobians = clock.since()
     baselines = (c.baseline_words for c in (*comparisons, *left_out.values()) if c.baseline_words)
+    contacts = what_touches(at.problem, at.u)
     warnings = (
         *warnings_of([m for m, _ in each], interrupted, problem, estimates, ahead),
         *conclusion.warnings,
         *at.warnings,
+        *pressed_in(at.problem, at.u, contacts),
         *outside(conclusion.experiments, conclusion.values),
         *(() if interrupted else (*misread(problem, best.u), *implausible(problem))),
     )
@@ -131,7 +133,7 @@ def result_of(
         misfit=misfit(at.problem, at.u),
         forces=tuple(row for c in comparisons for one in c.forces for row in one.fits()),
         growth=growth_rows(found.growths, reached.growths),
-        contacts=what_touches(at.problem, at.u),
+        contacts=contacts,
         shot=shot_motions(problem, best.u),
         fields=field_fits(at.problem, at.u, fields),
         kinks=() if interrupted else kinks(at.problem, at.u, estimates),

@@ -32,6 +32,8 @@ class ContactCounts:
         sticking_share: likewise, how much was held by friction.
         bdf1_share: of the scene's substeps, how many went with BDF1. With integrator "bdf2" that is the first one, and
             three from where a contact begins. BDF1 damps like zeta = omega h/2.
+        deepest: m, how far inside the collider one was at any frame, counted from the contact's radius; of one that
+            is held or driven nothing counts, as it touches nothing. None of self-contact.
     """
 
     most: int
@@ -40,6 +42,7 @@ class ContactCounts:
     sliding_share: float
     sticking_share: float
     bdf1_share: float
+    deepest: float | None
 
 
 def contact_modes(sizes: Mapping[str, int], modes: np.ndarray) -> dict[str, np.ndarray]:
@@ -50,12 +53,12 @@ def contact_modes(sizes: Mapping[str, int], modes: np.ndarray) -> dict[str, np.n
 
 
 def contact_counts(
-    names: Sequence[str], counted: Sequence[Mapping[str, int]], bdf1_share: float
+    names: Sequence[str], counted: Sequence[Mapping[str, int]], bdf1_share: float, deepest: Mapping[str, float]
 ) -> dict[str, ContactCounts]:
-    """By the contacts' names, from what the core has counted."""
+    """By the contacts' names, from what the core has counted and how deep particles were."""
     counts = {}
     for name, c in zip(names, counted, strict=True):
         slid = c["sliding"] / max(c["touching"], 1)
         stuck = (c["touching"] - c["sliding"]) / max(c["touching"], 1)
-        counts[name] = ContactCounts(c["most"], c["began"], c["ended"], slid, stuck, bdf1_share)
+        counts[name] = ContactCounts(c["most"], c["began"], c["ended"], slid, stuck, bdf1_share, deepest.get(name))
     return counts

@@ -70,10 +70,15 @@ class Extrapolated:
         self._runs = tuple(zip(solvers, weights, strict=True))
 
     def simulate(self, inputs: ArrayLike, steps: Sequence[int], t0: float) -> dict[str, Array]:
-        """Positions, velocities and multipliers, each combined; what is counted is that of the run at h."""
+        """Positions, velocities and multipliers, each combined; what is counted is that of the run at h, whose own
+        positions are "uncombined"."""
         found = [(s.simulate(inputs, own, t0), w) for s, own, w in self._each(steps)]
         first, states = found[0][0], ("positions", "velocities", "multipliers")
-        return first | {name: self._sum(w * np.asarray(out[name]) for out, w in found) for name in states}
+        return (
+            first
+            | {"uncombined": first["positions"]}
+            | {name: self._sum(w * np.asarray(out[name]) for out, w in found) for name in states}
+        )
 
     def states(self, inputs: ArrayLike, steps: Sequence[int], t0: float) -> Array:
         return self._sum(w * s.states(inputs, own, t0) for s, own, w in self._each(steps))

@@ -16,6 +16,7 @@ from ..files.memory import expect_room
 from ..quantities.kinds import KINDS
 from ..scene.scene import Scene
 from .contact_counts import ContactCounts, contact_counts, contact_modes
+from .depth import deepest
 from .solver import Solver
 
 MOST_SUBSTEPS = 2**31 - 1  # that the core counts
@@ -32,7 +33,8 @@ class Trajectory:
         forces: per group the constraints' multipliers (frames, count, rows) in units of force (distance: minus the
             tension in N; bend and hinge: minus the moment in N m), zero at the initial frame.
         pressures: per volume (frames,) its multiplier, Pa, inside above outside; zero at the initial frame.
-        contacts: per contact of the scene, by name, how many particles touched, slid, stuck, began and ended.
+        contacts: per contact of the scene, by name, how many particles touched, slid, stuck, began and ended, and
+            how deep they were.
         contact_modes: per contact, by name, (frames, particles) what each of its particles did in the last substep
             before a frame, numbers of `ContactMode`; apart in the initial frame, and where it is held or driven.
         scene: that was simulated; None of a motion that was put together otherwise.
@@ -98,14 +100,17 @@ def simulate(
     nodes, velocities = (out[name].reshape(frames, -1, 3) for name in ("positions", "velocities"))
     velocities[:, list(scene.directors)] = 0.0
     particles = slice(scene.particle_count)
+    at = np.array(steps) * solver.h
+    modes = contact_modes({c.name: len(c.particles) for c in scene.contacts.contacts}, out["contact_modes"])
+    depths = deepest(compiled, inputs, at, out.get("uncombined", out["positions"]), modes)
     return Trajectory(
-        np.array(steps) * solver.h,
+        at,
         nodes[:, particles],
         velocities[:, particles],
         forces_by_group(scene, out["multipliers"]),
         pressures_by_volume(scene, out["multipliers"]),
-        contact_counts(list(scene.contacts.counted()), out["contacts"], out["first_order"] / max(steps[-1], 1)),
-        contact_modes({c.name: len(c.particles) for c in scene.contacts.contacts}, out["contact_modes"]),
+        contact_counts(list(scene.contacts.counted()), out["contacts"], out["first_order"] / max(steps[-1], 1), depths),
+        modes,
         scene,
         nodes,
         velocities,

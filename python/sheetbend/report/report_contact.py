@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from ..quantities.wording import short
-from ..result.result import ContactFit, FitData
+from ..result.result import FitData
 from .tables import Section
 
+SMALLEST = 1e-6  # m, depth that a table has digits for
 NO_LOSSES = "energy that the model loses otherwise than the recording is not looked for in motions with contacts"
 
 
@@ -25,19 +26,22 @@ def _contacts(result: FitData) -> Section:
             _percent(c.sliding),
             _percent(c.sticking),
             _percent(c.bdf1),
+            "" if c.deepest is None else _depth(c.deepest),
         )
         for c in result.contacts
     ]
-    headers = ("recording", "contact", "most at once", "began", "ended", "sliding", "sticking", "bdf1")
+    headers = ("recording", "contact", "most at once", "began", "ended", "sliding", "sticking", "bdf1", "deepest")
     notes = (
         ("sliding, sticking", "shares of all touches, over all substeps"),
         ("self-contact", "counted in pairs where it has friction, out of those that there is room for"),
         ("bdf1", "share of the substeps of backward Euler, which damps vibrations"),
+        ("deepest", "particle inside the shape at any frame, counted from the contact's radius"),
         ("losses", NO_LOSSES),
         *(
             (
                 f"start of {c.recording}",
-                f"settle moved {c.settled} particle{'s' * (c.settled > 1)} out of {c.contact}, by up to {_mm(c)} mm",
+                f"settle moved {c.settled} particle{'s' * (c.settled > 1)} out of {c.contact}, "
+                f"by up to {_mm(c.settled_by)} mm",
             )
             for c in result.contacts
             if c.settled
@@ -60,8 +64,12 @@ def _kinks(result: FitData) -> Section:
     )
 
 
-def _mm(contact: ContactFit) -> str:
-    return short(1e3 * contact.settled_by, 2)
+def _mm(length: float) -> str:
+    return short(1e3 * length, 2)
+
+
+def _depth(deepest: float) -> str:
+    return f"{_mm(deepest)} mm" if deepest >= SMALLEST else f"< {_mm(SMALLEST)} mm"
 
 
 def _percent(share: float) -> str:

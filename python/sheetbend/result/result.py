@@ -189,12 +189,11 @@ class ContactFit:
     Attributes:
         recording, contact: names.
         particles: that may touch; of ropes and cloths that touch themselves with friction, pairs, here and below.
-        most: that touch at once.
-        began, ended: how often one begins and ends to touch.
+        most, began, ended: how many touch at once, and how often one begins and ends to.
         sliding, sticking: shares of all touches, particle by particle and substep by substep.
         bdf1: share of the scene's substeps that went with backward Euler, which damps vibrations.
-        settled: particles that started inside the collider and were moved to its surface.
-        settled_by: m, the farthest of these moves.
+        settled, settled_by: particles that started inside the collider, and the farthest move [m] to its surface.
+        deepest: m, how far inside the collider one was at any frame; None of self-contact.
     """
 
     recording: str
@@ -208,6 +207,7 @@ class ContactFit:
     bdf1: float
     settled: int = 0
     settled_by: float = 0.0
+    deepest: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
