@@ -13,7 +13,7 @@ def run(code: str) -> str:
 def test_loads_neither_torch_nor_scipy() -> None:
     loaded = run(
         "import sys, sheetbend; "
-        "heavy = ('torch', 'jax', 'scipy', 'matplotlib', 'rich', 'typer', 'pydantic', 'trimesh'); "
+        "heavy = ('torch', 'jax', 'scipy', 'matplotlib', 'rich', 'typer', 'pydantic', 'trimesh', 'threadpoolctl'); "
         "print([m for m in heavy if m in sys.modules])"
     )
     assert loaded == "[]"

@@ -19,6 +19,7 @@ from ..experiment.experiment import Experiment
 from ..minimum.continuity import joined
 from ..minimum.discretization import Refinement, wanted_refinement
 from ..minimum.journal import journaled
+from ..minimum.linear_algebra import one_blas_thread
 from ..minimum.optimizers import Observer, ceres_trouble
 from ..minimum.problem import FitProblem, ParameterLike, as_parameters
 from ..minimum.search import Search
@@ -89,6 +90,7 @@ class Fit:
 
 @shared_out
 @journaled
+@one_blas_thread()
 def fit(
     scene: Scene | Experiment | Sequence[Experiment],
     recording: Recording | None = None,

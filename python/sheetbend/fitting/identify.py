@@ -22,6 +22,7 @@ from ..doubts.roughness import rough_parameters
 from ..errors import InputError, SheetbendError
 from ..experiment.experiment import Experiment
 from ..minimum.growth import growths, in_words
+from ..minimum.linear_algebra import one_blas_thread
 from ..minimum.problem import FitProblem, ParameterLike, as_parameters
 from ..minimum.smooth import Smooth, with_fields
 from ..optional import require
@@ -84,6 +85,7 @@ class _Noise:
         return f"noise of {size} mm in each coordinate of a marker{alike}; the time step and the mesh count as exact"
 
 
+@one_blas_thread()
 def identify(
     scene: Scene | Experiment | Sequence[Experiment],
     recording: Recording | None = None,

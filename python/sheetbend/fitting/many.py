@@ -14,6 +14,7 @@ from ..errors import InputError, SheetbendError
 from ..experiment.experiment import Experiment
 from ..minimum.blocks import Arrow, ManyApproach, ManyProblem, reduced
 from ..minimum.counts import counted
+from ..minimum.linear_algebra import one_blas_thread
 from ..minimum.optimizers import Progress
 from ..minimum.problem import ParameterLike, as_parameters
 from ..minimum.workers import shared_out
@@ -31,6 +32,7 @@ RESTS = 1e-6  # of a parameter's size: so near a bound it rests there
 
 
 @shared_out
+@one_blas_thread()
 def fit_many(
     experiments: Sequence[Experiment],
     parameters: Mapping[str, ParameterLike] | Iterable[str],

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 from ..fitting.fit import Fit
 from ..minimum.journal import journaled
+from ..minimum.linear_algebra import one_blas_thread
 from ..objects.chain import unit_vector
 from ..recording.recording import Recording
 from .bounds import at_bounds
@@ -78,6 +79,7 @@ class RopeFit:
 
 
 @journaled
+@one_blas_thread()
 def fit_rope(
     recordings: Sequence[Recording | GrippedMotion],
     *,

@@ -23,6 +23,7 @@ from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
 
 from ..errors import InputError, SheetbendError
 from . import content
+from .linear_algebra import one_blas_thread
 from .traffic import Traffic
 
 KEPT = 8  # things that calls have in common, in each worker
@@ -162,6 +163,7 @@ class _Kept(threading.local):
 _kept = _Kept()
 
 
+@one_blas_thread()
 def _answer(work: Callable[[Any, Any], T], key: bytes, common: bytes | None, item: bytes) -> Answer | None:
     """In a worker; None where it does not have the common part."""
     began, values = time.thread_time(), _kept.values

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..arrays.timeseries import Array
 from ..errors import InputError
+from ..minimum.linear_algebra import one_blas_thread
 from ..motion.equilibrium import NoEquilibriumError
 from ..objects.fabric import Fabric
 from ..objects.laws import Spline, Stiffening
@@ -143,6 +144,7 @@ def _widening(misfit: float, freedom: int) -> float:
     return math.sqrt(max(1.0, misfit / freedom)) if freedom > 0 else 1.0
 
 
+@one_blas_thread()
 def fit_fabric(measured: Sequence[Measured], start: Fabric, free: Sequence[str]) -> FabricFit:
     """Find numbers of a fabric whose tests read what the laboratory has read: least squares, weighted by sigma.
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays.checks import is_number
 from ..errors import InputError
+from ..minimum.linear_algebra import one_blas_thread
 from ..objects.fabric import Fabric
 from ..objects.laws import Exponential, Law, Linear, Sinh, Spline
 from .curve import Curve, chosen, mean_curve, same_test
@@ -92,6 +93,7 @@ def pulled(
     return found
 
 
+@one_blas_thread()
 def fit_pull(
     curves: Sequence[Curve],
     along: str = "warp",

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..minimum.linear_algebra import one_blas_thread
 from ..objects.fabric import Fabric
 from ..objects.laws import Exponential, Law, Linear, Sinh
 from .curve import Curve
@@ -62,6 +63,7 @@ class WholeFabric:
     reasons: tuple[str, ...]
 
 
+@one_blas_thread()
 def fit_tests(tests: FabricTests) -> WholeFabric:
     """Find one fabric from all of its tests together.
 
