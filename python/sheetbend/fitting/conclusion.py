@@ -22,6 +22,7 @@ from ..doubts.profiles import Elsewhere
 from ..doubts.spin import spins_otherwise
 from ..doubts.stuck import bounded_by_sticking
 from ..doubts.told import Told
+from ..doubts.unstable import unstable_rests
 from ..doubts.wrong_given import doubts_of, explained_by, wrong_in_either
 from ..doubts.wrong_given import warnings_of as wrong_given_warnings
 from ..experiment.experiment import Experiment
@@ -143,6 +144,7 @@ def _doubts(
         missing_loss(at.problem, at.u, fitted, explained_by(at.problem, wrong)),
         missing_force(at.problem, at.u, judged),
         spin,
+        unstable_rests(*fitted),
     )
     return warnings, together(*lacking, drawn_off, contradicted)
 
