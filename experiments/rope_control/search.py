@@ -1,4 +1,4 @@
-"""Ways to a task's target: along the gradient by L-BFGS, and by an evolution strategy that sees costs alone."""
+"""Two searches for a target: L-BFGS, which follows the gradient, and an evolution strategy, which sees costs alone."""
 
 from __future__ import annotations
 

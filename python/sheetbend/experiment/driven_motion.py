@@ -17,10 +17,8 @@ from .experiment import Experiment
 Array = np.ndarray
 SAME_TIME = 1e-6  # s
 WIDTHS = tuple(2.0 ** (k / 4) for k in range(4, 30))  # times that of the fewest frames
-FAR, PART = (
-    10.0,
-    0.1,
-)  # times `driven_sigma`, and of its sway: a motion farther off was estimated from another recording
+FAR, PART = 10.0, 0.1
+"""Times `driven_sigma`, and of the recorded sway: a motion that is farther off was estimated from another recording."""
 
 
 def recorded_motion(e: Experiment) -> Recording | None:
@@ -52,21 +50,24 @@ def estimated_motion(e: Experiment, correction: Array) -> Recording | None:
         correction: (knots, markers, 3) m, of the fit (`Fit.corrections`), which ends behind the fitted part.
     """
     recorded = recorded_motion(e)
-    if recorded is None:
-        return None
-    times, positions = recorded.times, recorded.positions.copy()
-    known = len(times) if e.static else int(np.searchsorted(times, e.fitted().times[-1] + SAME_TIME))
-    positions[:known] += correction[:known]
-    if known < len(times):
-        positions[known:] = _behind(times, recorded.positions, positions, known, e.driven_noise or 0.0)
-    return replace(recorded, positions=positions)
+    return None if recorded is None else replace(recorded, positions=_estimated(e, recorded, correction))
 
 
 def continued(e: Experiment, correction: Array) -> Array:
     """(knots, markers, 3) m, what `estimated_motion` adds to the recorded motion at every knot; the correction itself
     where that is None."""
-    motion, recorded = estimated_motion(e, correction), recorded_motion(e)
-    return correction if motion is None or recorded is None else motion.positions - recorded.positions
+    recorded = recorded_motion(e)
+    return correction if recorded is None else _estimated(e, recorded, correction) - recorded.positions
+
+
+def _estimated(e: Experiment, recorded: Recording, correction: Array) -> Array:
+    """(knots, markers, 3) m, the recorded motion corrected, and smoothed behind the fitted part."""
+    times, positions = recorded.times, recorded.positions.copy()
+    known = len(times) if e.static else int(np.searchsorted(times, e.fitted().times[-1] + SAME_TIME))
+    positions[:known] += correction[:known]
+    if known < len(times):
+        positions[known:] = _behind(times, recorded.positions, positions, known, e.driven_noise or 0.0)
+    return positions
 
 
 def _behind(times: Array, recorded: Array, positions: Array, known: int, noise: float) -> Array:

@@ -227,6 +227,3 @@ def notes(ride: Riding, below: float) -> tuple[list[str], list[str]]:
             "how the cloth moves at the start, when the tool moves already: it starts at rest. Record a rest"
         )
     return seen, unknown
-
-
-__all__ = ["Poses", "Riding", "lines", "notes", "placed", "riding"]

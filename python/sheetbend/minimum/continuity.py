@@ -25,11 +25,10 @@ from ..quantities.parameters import Parameters
 from ..result.shot import ShotMotion
 from ..statistics.chain import Chain
 from ..statistics.covariance import autocorrelation
-from .approach import Approach
 from .growth import over_fit
 from .lifted import Lifted, Motion
 from .lifted_starts import begun
-from .optimizers import Observer, Progress
+from .optimizers import Observer, walked
 from .parts import expanded_to
 from .problem import FitProblem
 
@@ -38,7 +37,7 @@ PARTS = 10  # at least, of a motion whose windows are chosen
 FINER = (4, 2)  # parts of a window that states are looked for in first
 LOOSE = 0.1  # of the motion's size: gaps to begin with
 CLOSER = 0.03  # of the gap before: the next one that parameters are fitted with, at least
-ROUNDS, STEPS, TOLERANCE = 12, 20, 1e-3  # of gaps, of the walk with each, and of the cost there
+ROUNDS = 12  # of gaps
 SETTLED = 0.03  # of the logarithm of a gap's size
 SMALLEST, LARGEST, LOOKED = 1e-6, 1.0, 37  # of the motion's size: gaps that are looked at, and how many
 LIKELY = 3.841  # of twice the logarithm of a likelihood: 95 % of a chi-square with one degree
@@ -75,7 +74,7 @@ def joined(
     fitted = [_with_gap(e, LOOSE * size[e.name]) for e in fitted]
     for _ in range(ROUNDS):
         problem = FitProblem(fitted, wanted, threads=threads, expanded=parameters)
-        u = _walked(problem, u, observe)
+        u = walked(problem, u, observe)
         ok, _, _ = problem.evaluate(u)
         if not ok:
             break
@@ -95,21 +94,7 @@ def joined(
             break
     for i, e in zip(places, fitted, strict=True):
         every[i] = e
-    at = parameters.to_physical(u)
-    for name in parameters.free:
-        parameters = parameters.replace(name, initial=at[name])
-    return every, parameters
-
-
-def _walked(problem: FitProblem, u: Array, observe: Observer | None) -> Array:
-    """Where a walk ends that leaves the last steps to a search."""
-    walk = Approach(problem, u)
-    while walk.iterations < STEPS and walk.step():
-        if observe is not None:
-            observe(Progress(walk.iterations, walk.cost, walk.u.copy()))
-        if walk.promised < TOLERANCE:
-            break
-    return walk.u
+    return every, parameters.starting_at(u)
 
 
 def _nearer(
@@ -121,7 +106,7 @@ def _nearer(
     u = expanded.initial()
     short = [_with_gap(e, LOOSE * _size(e)) for e in begun([e for e, _ in parts], wanted, u)]
     problem = FitProblem(short, wanted, threads=threads, expanded=expanded)
-    u = _walked(problem, u, observe)
+    u = walked(problem, u, observe)
     problem.evaluate(u)
     found = []
     for i, (e, (_, count)) in enumerate(zip(experiments, parts, strict=True)):

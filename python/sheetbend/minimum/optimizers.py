@@ -16,12 +16,13 @@ from ..errors import InputError, SheetbendError
 from ..optional import require
 from ..quantities.wording import short
 from ..statistics.gauge import RANK_TOLERANCE
-from .approach import inside
+from .approach import Approach, inside
 from .conditioning import Condition
 from .counts import count, counted
 from .problem import FitProblem
 
 OPTIMIZERS = ("auto", "ceres", "scipy")
+WALK, WALK_PROMISE = 20, 1e-3  # steps before a search at most, and of the cost what a step must promise to go on
 LOST = 0.1  # of the cost: a slope that promises so much is no end
 STUCK = 1e-5  # of the cost: a third of a standard error where residuals are ten thousand
 ROUNDING = 1e-12  # of the first cost: residuals of data without noise end as rounding errors, which have any slope
@@ -62,6 +63,17 @@ class Minimum:
 
 
 Observer = Callable[[Progress], None]
+
+
+def walked(problem: FitProblem, u: np.ndarray, observe: Observer | None) -> np.ndarray:
+    """(free,) where a walk from u ends that leaves the last steps to a search."""
+    walk = Approach(problem, u)
+    while walk.iterations < WALK and walk.step():
+        if observe is not None:
+            observe(Progress(walk.iterations, walk.cost, walk.u.copy()))
+        if walk.promised < WALK_PROMISE:
+            break
+    return walk.u
 
 
 def has_ceres() -> bool:

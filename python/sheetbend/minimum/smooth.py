@@ -21,8 +21,7 @@ from ..experiment.experiment import Experiment
 from ..objects.stiffness_field import StiffnessField
 from ..quantities.parameters import Parameter, Parameters
 from ..statistics.covariance import autocorrelation
-from .approach import Approach
-from .optimizers import Observer, Progress
+from .optimizers import Observer, walked
 from .parts import expanded_to
 from .problem import FitProblem
 
@@ -30,7 +29,7 @@ FIRST_SIZE, FIRST_LENGTH = 0.5, 0.25  # of ln E; of the extent
 SIZES, LENGTHS = (1e-3, 10.0), (0.1, 10.0)  # that are looked at; lengths of the shortest wave's and of the extent
 LOOKED = 33  # sizes, and as many lengths
 FINER = 4  # times closer, about the best
-ROUNDS, STEPS, TOLERANCE = 12, 20, 1e-3  # of priors, of the walk with each, and of the cost there
+ROUNDS = 12  # of priors
 SETTLED = 0.03  # of the logarithms of both
 LIKELY = 3.841  # of twice the logarithm of a likelihood: 95 % of a chi-square with one degree
 POSSIBLE = 25.0  # likewise: what is less likely weighs less than 4e-6
@@ -128,13 +127,7 @@ def settled(
         for field in found:
             wanted, here = field.carried(wanted), field.carried(here)
         problem = FitProblem(experiments, wanted, threads=threads, expanded=here)
-        walk = Approach(problem, u)
-        while walk.iterations < STEPS and walk.step():
-            if observe is not None:
-                observe(Progress(walk.iterations, walk.cost, walk.u.copy()))
-            if walk.promised < TOLERANCE:
-                break
-        u = walk.u
+        u = walked(problem, u, observe)
         picture = Picture.at(problem, u, found)
         if picture is None:
             break
@@ -145,10 +138,7 @@ def settled(
             break
     for field in found:
         wanted, here = field.carried(wanted), field.carried(here)
-    at = here.to_physical(u)
-    for name in here.free:
-        here = here.replace(name, initial=at[name])
-    return wanted, here, found
+    return wanted, here.starting_at(u), found
 
 
 def _apart(a: Field, b: Field) -> float:

@@ -202,6 +202,11 @@ class Parameters(Mapping[str, Parameter]):
             raise InputError("parameters", "have no such name", name, f"name one of: {', '.join(self)}")
         return Parameters(replace(p, **changes) if p.name == name else p for p in self.values())
 
+    def starting_at(self, internal: Array) -> Parameters:
+        """The same parameters, of which the free ones start at an internal point (free,)."""
+        at = self.to_physical(internal)
+        return Parameters(replace(p, initial=at[p.name]) if p.name in self._column else p for p in self.values())
+
     def expand(self, recordings: Sequence[str], own: Mapping[str, float] | None = None) -> Parameters:
         """Turn each private parameter into one per recording, named `name[recording]`; shared ones stay.
 
