@@ -13,7 +13,7 @@ import numpy as np
 import sheetbend as sb
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import uniform_filter1d
-from sheetbend.objects.hand_eye import rotated
+from sheetbend.arrays.rotations import rotated
 
 Array = np.ndarray
 

@@ -99,4 +99,4 @@ def test_poses_of_something_else_are_refused(tmp_path: Path) -> None:
         assert result.exit_code == 2, result.output
     file.write_text("time,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,0\n1,0,0,0,0,0,0,1\n")
     result = run("new", HELD / "seen.npz", "--poses", file, "--output", tmp_path / "draft.toml")
-    assert result.exit_code == 2 and "quaternion" in result.output, result.output
+    assert result.exit_code == 2 and "poses.csv: poses.quaternions: has no length" in result.output, result.output

@@ -96,3 +96,23 @@ def rotation_vectors(quaternions: Array, first: Array) -> Array:
 def cross_matrix(v: ArrayLike) -> Array:
     """(3, 3) whose product with a vector is v x that vector."""
     return np.cross(np.asarray(v, dtype=float), np.eye(3)).T
+
+
+def unit_quaternions(field: str, quaternions: ArrayLike, shape: tuple[int, ...]) -> Array:
+    """Quaternions of a shape (..., 4), made to have length 1.
+
+    Raises:
+        SceneError: shapes, NaN, or one of no length.
+    """
+    q = finite(field, quaternions, shape, SceneError)
+    size = np.linalg.norm(q, axis=-1, keepdims=True)
+    if not (size > 0).all():
+        raise SceneError(field, "has no length", int(np.argmin(size)), "give (x, y, z, w)")
+    return np.asarray(q / size)
+
+
+def rotated(quaternions: Array, vectors: Array) -> Array:
+    """Vectors (..., 3) turned by unit quaternions (..., 4), (x, y, z, w); shapes broadcast."""
+    xyz, w = quaternions[..., :3], quaternions[..., 3:]
+    twice = 2.0 * np.cross(xyz, vectors)
+    return np.asarray(vectors + w * twice + np.cross(xyz, twice))

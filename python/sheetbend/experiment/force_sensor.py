@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ..arrays.checks import finite, is_number
+from ..arrays.rotations import rotated
 from ..errors import InputError
-from ..objects.hand_eye import rotated
 from ..quantities.quantities import Term, product
 from ..recording.force_recording import ForceRecording
 from ..scene.body import GROUND

@@ -13,8 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..arrays.rotations import continuous, matrices_of, quaternions_of, rotation_matrix
-from ..errors import RecordingError
+from ..arrays.poses import checked_poses, poses_at
+from ..arrays.rotations import matrices_of, quaternions_of, rotation_matrix
+from ..errors import RecordingError, SceneError
 from ..recording.io.poses import read_poses
 from .seen import Seen
 from .text import table
@@ -53,20 +54,19 @@ class Poses:
         Raises:
             RecordingError: the file is missing, damaged, or holds no poses over time.
         """
-        t, x, q = read_poses(path)
-        size = np.linalg.norm(q, axis=-1)
-        if len(t) < 2 or not (np.diff(t) > 0).all() or not (np.isfinite(x).all() and np.isfinite(q).all()):
-            fix = "give a row for each time, with times that increase and no gaps"
-            raise RecordingError("poses", "are no motion over time", path.name, fix)
-        if not (size > 0).all():
-            raise RecordingError("poses", "have a quaternion of no length", path.name, "give unit quaternions")
-        return cls(file, t, x, continuous(q / size[:, None]))
+        try:
+            t, x, q = checked_poses("poses", *read_poses(path))
+        except SceneError as problem:
+            field = f"{path.name}: {problem.field}"
+            raise RecordingError(field, problem.problem, problem.got, problem.fix) from problem
+        if len(t) < 2:
+            raise RecordingError("poses", "are no motion over time", path.name, "give a row for each time")
+        return cls(file, t, x, q)
 
     def at(self, times: Array) -> tuple[Array, Array]:
         """Positions (n, 3) and rotations (n, 3, 3), linear between poses."""
-        x = np.stack([np.interp(times, self.times, axis) for axis in self.positions.T], axis=1)
-        q = np.stack([np.interp(times, self.times, axis) for axis in self.quaternions.T], axis=1)
-        return x, matrices_of(q / np.linalg.norm(q, axis=1)[:, None])
+        x, q = poses_at(self.times, self.positions, self.quaternions, times)
+        return x, matrices_of(q)
 
 
 @dataclass(frozen=True, eq=False)

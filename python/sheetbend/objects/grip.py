@@ -9,9 +9,10 @@ from numpy.typing import ArrayLike
 
 from ..arrays.checks import finite
 from ..arrays.rigid import rigid_motion
+from ..arrays.rotations import rotated, unit_quaternions
 from ..arrays.smoothing import smoothed
 from ..errors import SceneError
-from .hand_eye import HandEye, rotated, unit_quaternions
+from .hand_eye import HandEye
 
 Array = np.ndarray
 

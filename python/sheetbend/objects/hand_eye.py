@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import finite, is_number
+from ..arrays.rotations import rotated, unit_quaternions
 from ..errors import InputError, SceneError
 from ..quantities.expression import rotation_products
 from ..quantities.parameters import Parameter
@@ -161,23 +162,3 @@ class HandEye:
         yield from self.turned(arm, {})
         for axis, q in enumerate(self.quantities[:3]):
             yield {q: "identity"}, np.broadcast_to(shifts[:, None] * np.eye(3)[axis], arm.shape)
-
-
-def unit_quaternions(field: str, quaternions: ArrayLike, shape: tuple[int, ...]) -> Array:
-    """Quaternions of a shape (..., 4), made to have length 1.
-
-    Raises:
-        SceneError: shapes, NaN, or one of no length.
-    """
-    q = finite(field, quaternions, shape, SceneError)
-    size = np.linalg.norm(q, axis=-1, keepdims=True)
-    if not (size > 0).all():
-        raise SceneError(field, "has no length", int(np.argmin(size)), "give (x, y, z, w)")
-    return np.asarray(q / size)
-
-
-def rotated(quaternions: Array, vectors: Array) -> Array:
-    """Vectors (..., 3) turned by unit quaternions (..., 4), (x, y, z, w); shapes broadcast."""
-    xyz, w = quaternions[..., :3], quaternions[..., 3:]
-    twice = 2.0 * np.cross(xyz, vectors)
-    return np.asarray(vectors + w * twice + np.cross(xyz, twice))

@@ -9,14 +9,15 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import check_increasing, finite, is_number
-from ..arrays.rotations import continuous, rotation_vectors
+from ..arrays.checks import finite, is_number
+from ..arrays.poses import checked_poses, poses_at
+from ..arrays.rotations import rotated, rotation_vectors
 from ..errors import SceneError
 from ..quantities.quantities import ZERO_OR_MORE
 from ..recording.io.poses import read_poses
 from ..scene.colliders import Collider
 from ..scene.scene import Scene
-from .hand_eye import HandEye, rotated, unit_quaternions
+from .hand_eye import HandEye
 
 Array = np.ndarray
 Shape = TypeVar("Shape", bound=Collider)
@@ -58,12 +59,8 @@ class Tool:
             if not rod.any():
                 raise SceneError("tool.rod", "has no length", rod.tolist(), "give a direction in the tool's axes")
             object.__setattr__(self, "rod", rod / np.linalg.norm(rod))
-        t = finite("tool.times", self.times, None, SceneError).ravel()
-        check_increasing("tool.times", t)
-        x = finite("tool.positions", self.positions, (len(t), 3), SceneError)
-        q = unit_quaternions("tool.quaternions", self.quaternions, (len(t), 4))
-        # neighbors on one side, so that what lies between them is between them
-        for name, values in (("times", t), ("positions", x), ("quaternions", continuous(q))):
+        poses = checked_poses("tool", self.times, self.positions, self.quaternions)
+        for name, values in zip(("times", "positions", "quaternions"), poses, strict=True):
             object.__setattr__(self, name, values)
 
     @classmethod
@@ -172,15 +169,8 @@ class Tool:
         return np.asarray(load - (load * along).sum(axis=1, keepdims=True) * along)
 
     def _pose(self, time: float) -> tuple[Array, Array]:
-        """Position (3,) and unit quaternion (4,), linear between poses and constant outside."""
-        right = int(np.clip(np.searchsorted(self.times, time), 1, max(len(self.times) - 1, 1)))
-        if len(self.times) == 1:
-            return self.positions[0], self.quaternions[0]
-        t = self.times[right - 1 : right + 1]
-        share = float(np.clip((time - t[0]) / (t[1] - t[0]), 0.0, 1.0))
-        weights = np.array([1.0 - share, share])
-        q = weights @ self.quaternions[right - 1 : right + 1]
-        return weights @ self.positions[right - 1 : right + 1], q / np.linalg.norm(q)
+        """Position (3,) and unit quaternion (4,) at a time."""
+        return poses_at(self.times, self.positions, self.quaternions, time)
 
 
 def accelerations(times: Array, x: Array) -> Array:
