@@ -8,8 +8,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "core/linear/conjugate_gradients.h"
 #include "core/solver/block_frames.h"
-#include "core/solver/conjugate_gradients.h"
 #include "core/solver/newton_matrix.h"
 
 namespace sheetbend {

@@ -11,9 +11,9 @@
 #include <optional>
 #include <vector>
 
+#include "core/linear/unsymmetric_factor.h"
 #include "core/solver/incremental_potential.h"
 #include "core/solver/paired_pattern.h"
-#include "core/solver/unsymmetric_factor.h"
 
 namespace sheetbend {
 

@@ -1,11 +1,11 @@
 #include "core/solver/ordering.h"
 
-#include <Eigen/OrderingMethods>
-#include <Eigen/SparseCore>
 #include <algorithm>
 #include <map>
 #include <numeric>
 #include <set>
+
+#include "core/linear/low_fill.h"
 
 namespace sheetbend {
 namespace {
@@ -157,20 +157,6 @@ void order_for_low_fill(const Scene& scene, std::vector<Member>& members) {
   std::vector<Member> ordered(members.size());
   for (std::size_t i = 0; i < members.size(); ++i) ordered[place[i]] = members[i];
   members = std::move(ordered);
-}
-
-std::vector<int> places_for_low_fill(int nodes, const std::vector<std::vector<int>>& joined) {
-  std::vector<Eigen::Triplet<double>> entries;
-  for (const auto& list : joined)
-    for (const int a : list)
-      for (const int b : list) entries.emplace_back(a, b, 1.0);
-  Eigen::SparseMatrix<double> graph(nodes, nodes);
-  graph.setFromTriplets(entries.begin(), entries.end());
-  Eigen::PermutationMatrix<Eigen::Dynamic> permutation;
-  Eigen::AMDOrdering<int>()(graph, permutation);
-  std::vector<int> place(nodes);
-  for (int i = 0; i < nodes; ++i) place[permutation.indices()(i)] = i;
-  return place;
 }
 
 }  // namespace sheetbend

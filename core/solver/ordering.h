@@ -19,7 +19,4 @@ std::vector<std::vector<Member>> connected_chains(const Scene& scene);
 // Reorders members by approximate minimum degree, for branches and loops.
 void order_for_low_fill(const Scene& scene, std::vector<Member>& members);
 
-// Places of nodes (numbered from 0) in an order of low fill, given which of them the constraints join.
-std::vector<int> places_for_low_fill(int nodes, const std::vector<std::vector<int>>& joined);
-
 }  // namespace sheetbend

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/solver/ordering.h"
+#include "core/linear/low_fill.h"
 
 namespace sheetbend {
 namespace {

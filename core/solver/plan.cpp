@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "core/linear/low_fill.h"
 #include "core/solver/block_frames.h"
 #include "core/solver/ordering.h"
 #include "core/solver/paired_pattern.h"

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "core/blocks/kernels.h"
+#include "core/linear/condensed.h"
 #include "core/packs/packed_colors.h"
 #include "core/scene/scene.h"
-#include "core/solver/condensed.h"
 #include "core/solver/options.h"
 
 namespace sheetbend {

@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "core/element/any_kind_hessian.h"
+#include "core/linear/low_fill.h"
 #include "core/scalar/pivot.h"
-#include "core/solver/ordering.h"
 
 namespace sheetbend {
 namespace {

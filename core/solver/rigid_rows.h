@@ -14,9 +14,9 @@
 #include <cmath>
 #include <vector>
 
+#include "core/linear/symmetric_factor.h"
 #include "core/scalar/numbers.h"
 #include "core/solver/plan.h"
-#include "core/solver/symmetric_factor.h"
 
 namespace sheetbend {
 

@@ -1,13 +1,13 @@
 // The two levels of conjugate gradients: aggregates of neighbors, products and sweeps by blocks, what rigid bodies take off a residual.
-#include "core/solver/aggregation.h"
+#include "core/linear/aggregation.h"
 
 #include <map>
 #include <set>
 
 #include "core/element/small_ldlt.h"
-#include "core/solver/block_matrix.h"
-#include "core/solver/coarse_level.h"
-#include "core/solver/conjugate_gradients.h"
+#include "core/linear/block_matrix.h"
+#include "core/linear/coarse_level.h"
+#include "core/linear/conjugate_gradients.h"
 #include "tests/cpp/support/compare.h"
 
 namespace sheetbend::testing {

@@ -1,5 +1,5 @@
 // Conjugate gradients: they solve, in lanes as alone; they end where there is nothing to do or nothing to hope for.
-#include "core/solver/conjugate_gradients.h"
+#include "core/linear/conjugate_gradients.h"
 
 #include "core/scalar/dual.h"
 #include "tests/cpp/support/programs.h"

@@ -1,6 +1,6 @@
 // The LDL^T of direct blocks against Eigen's dense solver, on chains, trees and loops; its cost must grow
 // linearly.
-#include "core/solver/symmetric_factor.h"
+#include "core/linear/symmetric_factor.h"
 
 #include <Eigen/Dense>
 

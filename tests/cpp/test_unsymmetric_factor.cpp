@@ -1,5 +1,5 @@
 // The LU of implicit blocks with sliding contacts against Eigen's dense one, on chains, trees, tangles and sheets of particles.
-#include "core/solver/unsymmetric_factor.h"
+#include "core/linear/unsymmetric_factor.h"
 
 #include <Eigen/Dense>
 

@@ -23,6 +23,7 @@ ALLOWED = {
     "core/packs": {"core/scalar", "core/constraints", "core/scene", "core/element", "core/threads"},
     "core/blocks": {"core/scalar", "core/constraints", "core/element", "core/packs"},
     "core/points": {"core/scalar"},
+    "core/linear": {"core/scalar", "core/element", "core/packs", "core/blocks"},
     "core/solver": {
         "core/scalar",
         "core/constraints",
@@ -31,6 +32,7 @@ ALLOWED = {
         "core/element",
         "core/packs",
         "core/blocks",
+        "core/linear",
         "core/points",
         "core/threads",
     },

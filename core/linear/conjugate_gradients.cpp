@@ -1,4 +1,4 @@
-#include "core/solver/conjugate_gradients.h"
+#include "core/linear/conjugate_gradients.h"
 
 #include <sstream>
 

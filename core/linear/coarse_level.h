@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "core/solver/aggregation.h"
+#include "core/linear/aggregation.h"
 
 namespace sheetbend {
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "core/blocks/unsymmetric_supernodes.h"
+#include "core/linear/symmetric_factor.h"
 #include "core/packs/kernels.h"
-#include "core/solver/symmetric_factor.h"
 
 namespace sheetbend {
 

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "core/element/small_ldlt.h"
-#include "core/solver/block_matrix.h"
-#include "core/solver/coarse_level.h"
-#include "core/solver/conjugate_gradients.h"
+#include "core/linear/block_matrix.h"
+#include "core/linear/coarse_level.h"
+#include "core/linear/conjugate_gradients.h"
 
 namespace sheetbend {
 

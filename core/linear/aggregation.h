@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "core/solver/condensed_shares.h"
-#include "core/solver/symmetric_factor.h"
+#include "core/linear/condensed_shares.h"
+#include "core/linear/symmetric_factor.h"
 
 namespace sheetbend {
 

@@ -1,9 +1,9 @@
-#include "core/solver/aggregation.h"
+#include "core/linear/aggregation.h"
 
 #include <algorithm>
 #include <utility>
 
-#include "core/solver/ordering.h"
+#include "core/linear/low_fill.h"
 
 namespace sheetbend {
 namespace {

@@ -1,4 +1,4 @@
-#include "core/solver/unsymmetric_factor.h"
+#include "core/linear/unsymmetric_factor.h"
 
 #include <algorithm>
 #include <stdexcept>

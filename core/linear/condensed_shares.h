@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "core/solver/block_numbers.h"
+#include "core/linear/block_numbers.h"
 
 namespace sheetbend {
 

@@ -12,8 +12,8 @@
 #include <variant>
 #include <vector>
 
-#include "core/solver/condensed_cg.h"
-#include "core/solver/condensed_factor.h"
+#include "core/linear/condensed_cg.h"
+#include "core/linear/condensed_factor.h"
 
 namespace sheetbend {
 

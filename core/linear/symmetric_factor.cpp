@@ -1,4 +1,4 @@
-#include "core/solver/symmetric_factor.h"
+#include "core/linear/symmetric_factor.h"
 
 #include <algorithm>
 #include <stdexcept>
