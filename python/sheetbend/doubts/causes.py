@@ -31,6 +31,9 @@ LEVEL_OF_DRIVEN = 0.01
 under a drawn rope passed for noise of the hand: chance 8e-5 to 1e-3, 30 tests, friction 37 % off and identified to
 5 % (measured)."""
 ALIKE = 0.05  # by so much less explained, another number is named beside
+BY_CHANCE = 4.0
+"""Of the residuals' sum of squares, in the noise's variance: by so much, chance tells two numbers apart. The other one
+is named beside."""
 MOST_NAMED = 3
 FARTHEST = {"rad": 0.3, "m": 0.1, "s": 0.1, "": 0.7}
 """Largest errors that are told, by unit; "" for relative ones. First order says nothing of larger ones."""
@@ -42,6 +45,29 @@ class Cause:
 
     explained: float
     parts: tuple[tuple[Told, float, Array], ...]
+
+
+@dataclass(frozen=True)
+class Wrong:
+    """What motions that share parameters ask of a told number.
+
+    Attributes:
+        motions: places of their experiments.
+        words: by how much a number is off, the likeliest first where several explain about as much.
+        steps: (free,) of each, internal, what the parameters would move with that number as asked for.
+        explained: share of what the fit leaves beyond noise.
+        times: what they leave beyond noise, as a multiple of the noise, or of what sigma allows where that is more.
+        sure: explains nearly all; else a third or more of what is much more than noise.
+        driven: with all taken out that another driven motion would explain.
+    """
+
+    motions: tuple[int, ...]
+    words: tuple[str, ...]
+    steps: tuple[Array, ...]
+    explained: float
+    times: float
+    sure: bool = True
+    driven: bool = False
 
 
 def seen_beside(q: Array, tried: Sequence[tuple[Told, Array]]) -> list[tuple[Told, Array, Array]]:
@@ -72,7 +98,7 @@ def causes(r: Array, seen: Sequence[tuple[Told, Array, Array]], left: float, lea
                     pairs.append(Cause(two.explained, tuple((one, more, column) for one, column, more in both)))
         found = pairs or found
     found.sort(key=lambda cause: -cause.explained)
-    alike = ALIKE if least == MOST else np.inf
+    alike = max(ALIKE, BY_CHANCE / left) if least == MOST else np.inf
     return [cause for cause in found if cause.explained > found[0].explained - alike][:MOST_NAMED]
 
 

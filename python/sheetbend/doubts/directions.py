@@ -43,6 +43,21 @@ class Asked:
     chance: float
 
 
+@dataclass(frozen=True)
+class Score:
+    """How much of a direction some residuals hold beside others.
+
+    Attributes:
+        more: of the direction, so that they would shrink the most.
+        gain: by how much their sum of squares would then be less.
+        chance: that a right model asks for so much, of either sign.
+    """
+
+    more: float
+    gain: float
+    chance: float
+
+
 def clearly(problem: FitProblem, u: Array, column: Array, mine: Array, tests: int) -> Asked | None:
     """`asked_for` at a minimum u (free,), if it explains a third of what some rows leave and chance does not, of so
     many tests. What noise of what drives the scenes does to the residuals counts as chance."""
@@ -79,14 +94,23 @@ def asked_for(
         errors: (rows, draws) random draws of errors that are alike in all of the data.
     """
     rows = len(layout.frame)
+    left = float(r[mine] @ r[mine]) - noise_in(r[:rows], layout, mine[:rows])
+    found = score(r, J, column, layout, taken, errors) if left > 0.0 else None
+    return None if found is None else Asked(found.more, found.gain / left, found.chance)
+
+
+def score(
+    r: Array, J: Array, column: Array, layout: Layout, taken: float = 0.0, errors: Array | None = None
+) -> Score | None:
+    """How much of a column residuals hold beside the columns of J; None where these replace it. Arguments are those of
+    `asked_for`."""
     beside, rank = _beside(J, column)
     inner = float(beside @ beside)
-    left = float(r[mine] @ r[mine]) - noise_in(r[:rows], layout, mine[:rows])
-    if not inner > RANK_TOLERANCE * float(column @ column) or not left > 0.0 or rows - taken <= rank + 1:
+    if not inner > RANK_TOLERANCE * float(column @ column) or len(layout.frame) - taken <= rank + 1:
         return None
     more = -float(beside @ r) / inner
     chance = _chance(abs(more), beside, r + more * beside, layout, taken + rank, errors)
-    return Asked(more, more**2 * inner / left, chance)
+    return Score(more, more**2 * inner, chance)
 
 
 def chance_of_drop(problem: FitProblem, u: Array, after: Array, mine: Array, drop: float) -> float:

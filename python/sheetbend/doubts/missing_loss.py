@@ -37,8 +37,8 @@ def missing_loss(
 
     Losses that are given are tested first (`held_losses`), then all losses by one simulation with the other integrator.
     Where that has no answer, it tells nothing, nor of motions with contacts, where another integrator or substep moves
-    when they begin and slide, which is no loss. Last, where neither shows anything, come fits with losses of
-    quite another size (`other_losses`).
+    when they begin and slide, which is no loss: these are asked for each loss by itself (`losses_beside_contacts`).
+    Last, where neither shows anything, come fits with losses of quite another size (`other_losses`).
 
     Args:
         problem: whose residuals count.

@@ -1,4 +1,4 @@
-"""What a model may lack: stretch, masses at its markers and free ends, drag, rest curvature, and motion at its start.
+"""What a model may lack: losses, stretch, masses at its markers and free ends, rest curvature, motion at its start.
 
 None of these has a number in the model, since it has none of them. But inputs of a simulation stand at zero there, and
 a little of each changes the residuals in a direction that one set of tangents tells.
@@ -7,7 +7,6 @@ a little of each changes the residuals in a direction that one set of tangents t
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -16,20 +15,16 @@ from ..errors import SheetbendError
 from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
-from .tangents import Input, tangents
+from .losses_at_zero import losses_at_zero, with_losses
+from .tangents import Part, tangents
 from .told import Told
-
-Part = tuple[str, Input, Callable[[float], str]]
-"""Its name, what one unit of it adds to an input, and what a size of it says of the model."""
 
 
 def missing_parts(problem: FitProblem, u: Array, i: int) -> list[Told]:
     """Directions of what the i-th experiment's model does not have; none where its motion has no answer at u (free,).
     Takes two sets of tangents."""
     e = problem.experiments[i]
-    with_drag = e.scene.shallow()
-    with_drag.has_drag = True
-    made = [replace(e, scene=with_drag) if k == i else other for k, other in enumerate(problem.experiments)]
+    made = [with_losses(e) if k == i else other for k, other in enumerate(problem.experiments)]
     theta, slots, _ = problem.known(u)
     parts = list(_parts(e, e.scene.compiled.inputs(theta[slots[i]])))
     try:
@@ -49,7 +44,7 @@ def _parts(e: Experiment, inputs: Array) -> Iterator[Part]:
     held = np.zeros(len(x), dtype=bool)
     held[e.scene.held] = True
     free = np.flatnonzero(~held & (mass > 0.0))
-    yield from _drags(free, mass, values)
+    yield from losses_at_zero(e, values, free)
     yield from _masses(e, held)
     yield from _stretch(e, x, values["compliance"])
     yield from _curvature(e, values["rest"], values["compliance"])
@@ -59,16 +54,6 @@ def _parts(e: Experiment, inputs: Array) -> Iterator[Part]:
         for axis, name in enumerate("xyz"):
             speed = np.cross(np.eye(3)[axis], arm).ravel()
             yield f"start about {name}", ("velocity", entries, speed), _turning(e.name, name)
-
-
-def _drags(free: np.ndarray, mass: Array, values: dict[str, Array]) -> Iterator[Part]:
-    for array, unit in (("drag_linear", "N s/m"), ("drag_quadratic", "N s^2/m^2")):
-        if not values[array].any():
-
-            def says(size: float, array: str = array, unit: str = unit) -> str:
-                return f"it had a {array} of {short(size, 2)} {unit} for every kg, which the model lacks"
-
-            yield array, (array, free, mass[free]), says
 
 
 def _masses(e: Experiment, held: Array) -> Iterator[Part]:

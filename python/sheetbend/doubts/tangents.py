@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,8 @@ from ..quantities.quantities import Term
 
 Input = tuple[str, np.ndarray, np.ndarray]
 """Name of an input array of a scene, entries of it (k,), and what is added to each (k,)."""
+Part = tuple[str, Input, Callable[[float], str]]
+"""What a model may lack: its name, what one unit of it adds to an input, and what a size of it says of the model."""
 
 
 def tangents(

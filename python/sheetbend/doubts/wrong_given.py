@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
@@ -29,13 +29,14 @@ from ..result.result import UNSOUND
 from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of
-from .causes import MOST, beyond_chance, causes, of_noise, of_what_is_left, seen_beside
-from .cloth_size import cloth_sizes
+from .causes import MOST, Cause, Wrong, beyond_chance, causes, of_noise, of_what_is_left, seen_beside
 from .contradictions import residual_shifts, value_words
 from .directions import EXPLAINS, noise_in, rows_of, tied
 from .driven_errors import FEW, driven_errors, driven_span
 from .held_losses import held_names
-from .missing_parts import missing_parts
+from .lacking import Lacking
+from .losses_at_zero import is_loss
+from .losses_beside_contacts import lost_beside_contacts
 from .other_losses import LEAVES
 from .told import LARGER, LATER, SLOWER, Told, told_numbers
 from .told_words import words_of
@@ -44,29 +45,6 @@ MUCH = 2.0
 """Times the noise, and the told sigma's where that is more: what a fit that misses much leaves beyond it. Residuals are
 1.7 sigma then, or more."""
 LONGEST = 5e7  # rows times directions: above, markers are asked only all together
-
-
-@dataclass(frozen=True)
-class Wrong:
-    """What motions that share parameters ask of a told number.
-
-    Attributes:
-        motions: places of their experiments.
-        words: by how much a number is off, the likeliest first where several explain about as much.
-        steps: (free,) of each, internal, what the parameters would move with that number as asked for.
-        explained: share of what the fit leaves beyond noise.
-        times: what they leave beyond noise, as a multiple of the noise, or of what sigma allows where that is more.
-        sure: explains nearly all; else a third or more of what is much more than noise.
-        driven: with all taken out that another driven motion would explain.
-    """
-
-    motions: tuple[int, ...]
-    words: tuple[str, ...]
-    steps: tuple[Array, ...]
-    explained: float
-    times: float
-    sure: bool = True
-    driven: bool = False
 
 
 def wrong_given(
@@ -88,17 +66,19 @@ def wrong_given(
     if not ok or not np.isfinite(J).all() or problem.estimates_corrections:
         return []
 
+    lacking = Lacking(problem, u)
+
     def asked(driven: Array | None = None) -> list[Wrong]:
-        found = _asked(problem, u, r, J, told, driven=driven)
+        found = _asked(problem, u, r, J, told, lacking, driven=driven)
         if found and refinement is not None and (shifts := residual_shifts(problem, u, refinement)):
-            found = _asked(problem, u, r, J, told, np.column_stack(shifts), driven)
+            found = _asked(problem, u, r, J, told, lacking, np.column_stack(shifts), driven)
         return found
 
     found = asked()
     sure = {one.motions for one in found if one.sure}
-    if not _much_left(problem, u, sure) or not (driven := driven_span(problem, u)).size:
-        return found
-    return _surer(found, asked(driven))
+    if _much_left(problem, u, sure) and (driven := driven_span(problem, u)).size:
+        found = _surer(found, asked(driven))
+    return _surer(found, _lost(problem, u, told, lacking, found, refinement))
 
 
 def _surer(found: Sequence[Wrong], others: Sequence[Wrong]) -> list[Wrong]:
@@ -142,6 +122,7 @@ def _asked(
     r: Array,
     J: Array,
     told: Sequence[Told],
+    lacking: Lacking,
     known: Array | None = None,
     driven: Array | None = None,
 ) -> list[Wrong]:
@@ -158,45 +139,66 @@ def _asked(
     there = np.zeros(count) if driven is None else (-inverse @ (q.T @ r))[:count]
     r = r - q @ (q.T @ r)
     errors = cache(partial(driven_errors, problem, u, FEW))
-    found = []
-    groups = tied(problem, still=True)
+    found, groups = [], tied(problem, still=True)
+
+    def likely(tried: Sequence[tuple[Told, Array]], mine: Array, left: float, least: float) -> list[Cause]:
+        white = max((float(r[mine] @ r[mine]) - left) / np.count_nonzero(mine), 1.0)
+        explaining = causes(r, seen_beside(q, tried), left, least)
+        chance = partial(of_what_is_left, r, J, mine, layout) if least == MOST else partial(of_noise, q, white)
+        tests = [math.comb(len(tried), len(cause.parts)) * len(groups) for cause in explaining]
+        each = zip(explaining, tests, strict=True)
+        return [cause for cause, n in each if beyond_chance(partial(chance, cause), n, errors)]
+
     for group in groups:
         mine = rows_of(problem, group)
         left = float(r[mine] @ r[mine]) - noise_in(r[:data], layout, mine[:data])
         if not left > 0.0:
             continue
-        moving = [i for i in group if not problem.experiments[i].static]
-        lacking = [part for i in moving for part in _lacking(problem, u, i)] if left > LEAVES * data else []
-        tried = list(_directions(problem, [*told, *lacking], group))
-        seen = seen_beside(q, tried)
-        allowed = max(float(r[mine] @ r[mine]) - left, float(np.count_nonzero(mine)))
-        white = allowed / np.count_nonzero(mine)
-        for least in (MOST, EXPLAINS) if left > MUCH * allowed else (MOST,):
-            explaining = causes(r, seen, left, least)
-            chance = partial(of_what_is_left, r, J, mine, layout) if least == MOST else partial(of_noise, q, white)
-            tests = [math.comb(len(tried), len(cause.parts)) * len(groups) for cause in explaining]
-            likely = [c for c, n in zip(explaining, tests, strict=True) if beyond_chance(partial(chance, c), n, errors)]
-            if likely:
-                words = tuple(
-                    " and ".join(words_of(one, more, problem, group) for one, more, _ in c.parts) for c in likely
-                )
-                moved = [np.sum([more * column for _, more, column in c.parts], axis=0) for c in likely]
-                steps = tuple(there + (-inverse @ (q.T @ by))[:count] for by in moved)
-                share, beside = likely[0].explained, driven is not None
-                found.append(Wrong(tuple(group), words, steps, share, left / allowed, least == MOST, beside))
-                break
+        much, allowed = left > LEAVES * data, max(float(r[mine] @ r[mine]) - left, float(np.count_nonzero(mine)))
+        tried = list(_directions(problem, [*told, *(lacking.of(group) if much else [])], group))
+        asked, sure = likely(tried, mine, left, MOST), True
+        if asked and not much and (parts := lacking.beside_contacts(group)):
+            asked = likely([*tried, *_directions(problem, parts, group)], mine, left, MOST) or asked
+        if not asked and left > MUCH * allowed:
+            asked, sure = likely(tried, mine, left, EXPLAINS), False
+        if asked:
+            words = tuple(" and ".join(words_of(one, more, problem, group) for one, more, _ in c.parts) for c in asked)
+            moved = [np.sum([more * column for _, more, column in c.parts], axis=0) for c in asked]
+            steps = tuple(there + (-inverse @ (q.T @ by))[:count] for by in moved)
+            share, beside = asked[0].explained, driven is not None
+            found.append(Wrong(tuple(group), words, steps, share, left / allowed, sure, beside))
     return found
 
 
-def _lacking(problem: FitProblem, u: Array, i: int) -> list[Told]:
-    """Directions of what no number of the model tells."""
-    return [*missing_parts(problem, u, i), *cloth_sizes(problem, u, i)]
+def _lost(
+    problem: FitProblem,
+    u: Array,
+    told: Sequence[Told],
+    lacking: Lacking,
+    found: Sequence[Wrong],
+    refinement: Refinement | None,
+) -> list[Wrong]:
+    """Losses that motions with contacts ask for, of which nothing else explains nearly all that is left."""
+    known, held = {one.motions for one in found if one.sure}, held_names(problem)
+    groups = [g for g in tied(problem) if lacking.beside_contacts(g)]
+    lost = []
+    for group in groups:
+        if tuple(group) not in known:
+            tried = _directions(problem, [*told, *lacking.beside_contacts(group)], group, held)
+            losses = [
+                (one, by) for one, by in tried if is_loss(one.label) or (one.missing is None and one.name in held)
+            ]
+            lost.append(lost_beside_contacts(problem, u, group, losses, len(groups), refinement))
+    return [one for one in lost if one is not None]
 
 
-def _directions(problem: FitProblem, told: Sequence[Told], group: Sequence[int]) -> Iterator[tuple[Told, Array]]:
-    """The errors that motions may share, or that one of them may have: (rows,) what each changes."""
-    rows, first, losses = problem.core.rows, problem.core.first_rows, set(held_names(problem))
-    within = [one for one in told if one.experiment in group and one.name not in losses]
+def _directions(
+    problem: FitProblem, told: Sequence[Told], group: Sequence[int], losses: Sequence[str] = ()
+) -> Iterator[tuple[Told, Array]]:
+    """The errors that motions may share, or that one of them may have: (rows,) what each changes. Of given losses only
+    some."""
+    rows, first, others = problem.core.rows, problem.core.first_rows, set(held_names(problem)) - set(losses)
+    within = [one for one in told if one.experiment in group and one.name not in others]
     apart = len(within) * rows <= LONGEST
     each: dict[str, tuple[Told, Array]] = {}
     for one in within:

@@ -7,7 +7,7 @@ from ..result.result import FitData
 from .tables import Section
 
 SMALLEST = 1e-6  # m, depth that a table has digits for
-NO_LOSSES = "energy that the model loses otherwise than the recording is not looked for in motions with contacts"
+LOSSES = "a drag or damping that the model lacks is looked for to first order, so a large one may be missed"
 
 
 def contact_sections(result: FitData) -> list[Section]:
@@ -36,7 +36,7 @@ def _contacts(result: FitData) -> Section:
         ("self-contact", "counted in pairs where it has friction, out of those that there is room for"),
         ("bdf1", "share of the substeps of backward Euler, which damps vibrations"),
         ("deepest", "particle inside the shape at any frame, counted from the contact's radius"),
-        ("losses", NO_LOSSES),
+        ("losses", LOSSES),
         *(
             (
                 f"start of {c.recording}",

@@ -1,0 +1,34 @@
+"""Directions of what no number of a model tells."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache, partial
+
+from ..arrays.timeseries import Array
+from ..minimum.problem import FitProblem
+from .cloth_size import cloth_sizes
+from .losses_at_zero import touches
+from .missing_parts import missing_parts
+from .told import Told
+
+
+class Lacking:
+    """Of the motions of a problem at u (free,), each one's once."""
+
+    def __init__(self, problem: FitProblem, u: Array) -> None:
+        self._experiments = problem.experiments
+        self._parts, self._sizes = (cache(partial(made, problem, u)) for made in (missing_parts, cloth_sizes))
+
+    def of(self, group: Sequence[int]) -> list[Told]:
+        """All of a group of motions."""
+        return [one for i in self._moving(group) for one in (*self._parts(i), *self._sizes(i))]
+
+    def beside_contacts(self, group: Sequence[int]) -> list[Told]:
+        """The parts that a group's motions lack; none where none of them has contacts."""
+        moving = self._moving(group)
+        touching = any(touches(self._experiments[i]) for i in moving)
+        return [one for i in moving for one in self._parts(i)] if touching else []
+
+    def _moving(self, group: Sequence[int]) -> list[int]:
+        return [i for i in group if not self._experiments[i].static]

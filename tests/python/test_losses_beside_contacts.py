@@ -1,0 +1,123 @@
+"""Losses that the model of a motion with contacts does not have: which one it is, and what becomes of friction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from sheetbend.doubts.causes import Wrong
+from sheetbend.doubts.losses_at_zero import is_loss
+from sheetbend.doubts.missing_parts import missing_parts
+from sheetbend.doubts.told import told_numbers
+from sheetbend.doubts.wrong_given import wrong_given
+from sheetbend.minimum.discretization import AUTO
+from sheetbend.minimum.optimizers import minimize
+from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.minimum.time_step import settle
+from test_contact_fit import SIGMA, SOLVER, TIMES
+
+WORLD = sb.Solver(h=2e-4, method="implicit", integrator="bdf1", extrapolate=2)
+NAMES = ("table_friction", "rope_EI")
+
+
+def dragged(friction: float = 0.3, EI: float = 1e-4, **losses: Any) -> sb.Scene:
+    """A rope whose start is drawn aside by 15 cm on a table."""
+    scene = sb.rope(0.3, 11, density=0.05, EA=200.0, EI=EI, start=(0, 0, 0.006), pinned=(), **losses)
+    rope, share = scene.ropes["rope"], np.clip((TIMES - 0.04) / 0.3, 0.0, 1.0)
+    path = np.zeros((len(TIMES), 1, 3))
+    path[:, 0, 1] = 0.15 * share**2 * (3 - 2 * share)
+    scene.drive(rope.particles[:1], TIMES, scene.positions[rope.particles[:1]] + path)
+    scene.contact(rope, sb.Plane(name="table"), friction=friction, radius=0.005)
+    return scene
+
+
+def thrown(friction: float = 0.3, EI: float = 1e-4, **losses: Any) -> sb.Scene:
+    """A rope that falls on a table at 0.6 m/s along it, slides and comes to rest."""
+    scene, line = sb.Scene("rope"), [[0.0, 0.0, 0.015], [0.3, 0.0, 0.015]]
+    along = [[0.0, 0.6, 0.0], [0.0, 0.3, 0.0]]
+    rope = sb.add_rope(
+        scene,
+        "rope",
+        points=line,
+        segments=11,
+        density=0.05,
+        EA=200.0,
+        EI=EI,
+        velocity=along,
+        **losses,
+    )
+    scene.contact(rope, sb.Plane(name="table"), friction=friction, radius=0.005)
+    return scene
+
+
+def seen(true: sb.Scene, model: sb.Scene, seed: int, whole: bool = True) -> sb.Experiment:
+    """A recording of the true scene with noise, explained by the model; without its driven particle, whose noise would
+    count, unless it is whole."""
+    particles = true.ropes["rope"].particles[0 if whole else 1 :]
+    x = sb.simulate(true, TIMES, WORLD).positions[:, particles]
+    x = x + SIGMA * np.random.default_rng(seed).standard_normal(x.shape)
+    recording = sb.Recording(positions=x, times=TIMES, name="drag")
+    places = [sb.on_particle(int(p)) for p in particles]
+    return sb.Experiment(scene=model, recording=recording, markers=places, solver=SOLVER, sigma=SIGMA)
+
+
+def minimum(e: sb.Experiment) -> tuple[FitProblem, np.ndarray]:
+    """In the limit of short substeps."""
+    problem = FitProblem([e], as_parameters(NAMES, [e]))
+    at = settle(problem, minimize(problem, problem.parameters.initial())[0].u)
+    return at.problem, at.u
+
+
+def asked(e: sb.Experiment) -> list[Wrong]:
+    problem, u = minimum(e)
+    return wrong_given(problem, u, told_numbers(problem, u)[0], AUTO)
+
+
+@pytest.mark.parametrize(("drag", "off"), [(0.2, 3.5), (0.05, 2.5)])
+def test_a_drag_that_is_missing_makes_the_friction_doubtful(drag: float, off: float) -> None:
+    """It was "identified" 3.8 and 2.9 half-widths off, at a reduced chi-square of 1.10 and 1.01."""
+    e = seen(dragged(drag_linear=drag), dragged(0.2, 2e-4), 0)
+    result = sb.fit(replace(e, fit=(0.0, 0.45)), parameters=NAMES, profiles=False, beginnings=False).result
+    friction = result["table_friction"]
+    assert friction.half_width is not None and friction.value - 0.3 > off * friction.half_width
+    assert friction.verdict == "doubtful" and "it had a drag_linear of" in friction.words
+    assert any("N s/m for every kg, which the model lacks" in words for words in result.warnings)
+
+
+def test_a_damping_that_is_missing_is_named_with_its_size() -> None:
+    """10 ms of bending, at a reduced chi-square of 1.03."""
+    (found,) = asked(seen(dragged(bend_damping=0.01), dragged(0.2, 2e-4), 0))
+    assert found.words == ("rope_bend had a damping of 8.5 ms, which the model lacks",)
+
+
+def test_a_given_drag_that_is_too_small_is_named() -> None:
+    (found,) = asked(seen(dragged(drag_linear=0.2), dragged(0.2, 2e-4, drag_linear=0.05), 0))
+    assert any("rope_drag_linear were" in words and "more" in words for words in found.words)
+
+
+@pytest.mark.parametrize("make", [dragged, thrown])
+def test_the_right_model_lacks_nothing(make: Callable[..., sb.Scene]) -> None:
+    for seed in range(2):
+        assert asked(seen(make(), make(0.27, 1.2e-4), seed, whole=False)) == []
+
+
+def test_tangents_of_losses_at_zero_are_what_a_little_of_them_changes() -> None:
+    """Of contacts that begin, stick and slide; damping changes what it is given for, and nothing else."""
+    e = seen(thrown(), thrown(), 0)
+    problem = FitProblem([e], as_parameters(NAMES, [e]))
+    u, little = problem.parameters.initial(), 1e-6
+    _, r, _ = problem.evaluate(u, jacobian=False)
+    losses = {part.label: part.column for part in missing_parts(problem, u, 0) if is_loss(part.label)}
+    assert list(losses) == ["drag_linear", "drag_quadratic", "damping of rope_stretch", "damping of rope_bend"]
+    per_kg = 0.05 * 0.3  # kg of the rope: drag_linear is that of all of it
+    for label, scene in (
+        ("drag_linear", thrown(drag_linear=little * per_kg / 0.3)),
+        ("damping of rope_bend", thrown(bend_damping=little)),
+    ):
+        _, more, _ = problem.of([replace(e, scene=scene)]).evaluate(u, jacobian=False)
+        difference = (more - r) / little
+        assert np.linalg.norm(difference - losses[label]) < 1e-3 * np.linalg.norm(difference), label
