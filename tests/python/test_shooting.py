@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.config import load
+from sheetbend.doubts.missing_loss import missing_loss
+from sheetbend.doubts.other_losses import other_losses
 from sheetbend.experiment.cut import borders
-from sheetbend.minimum.continuity import with_window
+from sheetbend.minimum.continuity import joined, with_window
 from sheetbend.minimum.journal import Journal
 from sheetbend.minimum.lifted import Lifted
 from sheetbend.minimum.lifted_window import LiftedWindow, Seen
+from sheetbend.minimum.optimizers import walked
 from sheetbend.minimum.problem import FitProblem, as_parameters
 from sheetbend.statistics.chain import Chain, Gap, Window
 
@@ -58,6 +61,19 @@ def cut(e: sb.Experiment, loss: float) -> FitProblem:
     states = tuple((1.0 + 0.1 * k, -0.3 * k) for k in range(1, len(borders(e)) - 1))
     e = replace(e, shooting=replace(e.shooting, states=states))  # type: ignore[type-var]
     return FitProblem([e], as_parameters(list(WANTED), [e]))
+
+
+def counted_windows(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
+    """Grows with every evaluation of a window: whether it makes derivatives."""
+    made: list[bool] = []
+    at = LiftedWindow.at
+
+    def counted(self: LiftedWindow, u: np.ndarray, state: np.ndarray, other: Seen | None = None) -> Seen | None:
+        made.append(other is None)
+        return at(self, u, state, other)
+
+    monkeypatch.setattr(LiftedWindow, "at", counted)
+    return made
 
 
 def test_a_chain_is_solved_as_one_dense_system() -> None:
@@ -127,14 +143,7 @@ def test_the_cost_at_the_best_states_has_the_gradient_that_is_told() -> None:
 
 def test_a_cost_takes_derivatives_of_another_point_only_where_they_hold(monkeypatch: pytest.MonkeyPatch) -> None:
     """And is that of a point with derivatives of its own."""
-    made: list[bool] = []
-    at = LiftedWindow.at
-
-    def counted(self: LiftedWindow, u: np.ndarray, state: np.ndarray, other: Seen | None = None) -> Seen | None:
-        made.append(other is None)
-        return at(self, u, state, other)
-
-    monkeypatch.setattr(LiftedWindow, "at", counted)
+    made = counted_windows(monkeypatch)
     first, windows = np.array([np.log(0.0032), np.log(1.5e-4), 1.0, 0.5]), 5
     for away, most in ((1e-3, 0), (0.03, windows), (0.1, windows)):
         own, kept = cut(swing(), 1e-2), cut(swing(), 1e-2)
@@ -228,6 +237,30 @@ def test_a_journal_brings_back_the_states_too(tmp_path: Path) -> None:
             assert (journal.read, journal.made) == (known, len(points) - known)
         for (_, r, J), (_, s, K) in zip(alone, resumed, strict=True):
             assert np.array_equal(r, s) and np.array_equal(J, K)
+
+
+@pytest.mark.parametrize(
+    ("given", "shooting", "doubt"),
+    [
+        (0.0, sb.Shooting(0.8), "swing loses energy that the model does not"),
+        (6e-4, sb.Shooting(0.8, 1e-5), "the given arm_hinge_viscosity is too large: with a third of it"),
+    ],
+)
+def test_a_wrong_loss_is_doubted_after_single_steps_of_the_states(
+    given: float, shooting: sb.Shooting, doubt: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where another loss leads far off, states that follow to the end would take dozens of steps."""
+    e, wanted = swing(stop=4.0), ("arm_inertia", "arm_angle", "arm_rate")
+    e = replace(e, scene=pendulum(0.0033, given)[0], shooting=shooting)
+    parameters = as_parameters(wanted, [e])
+    experiments, at = joined([e], parameters, 1)
+    problem = FitProblem(experiments, parameters, expanded=at)
+    u = walked(problem, problem.parameters.initial(), None)
+    problem.evaluate(u)
+    made = counted_windows(monkeypatch)
+    found = missing_loss(problem, u, (problem, u)) if given == 0.0 else other_losses(problem, u)
+    assert set(found) == set(wanted) and all(words.startswith(doubt) for words in found.values())
+    assert sum(made) <= 7 * 5  # of 5 windows; 12 * 5 where they follow to the end
 
 
 def test_windows_are_refused_where_they_cannot_be() -> None:
