@@ -57,7 +57,7 @@ def seen_whole(e: sb.Experiment) -> sb.Experiment:
 
 
 def fitted(e: sb.Experiment, parameters: Parameters, loss: float | None = None) -> Found:
-    """The minimum alone; `sheetbend fit` also derives intervals and doubts, which takes several times as long.
+    """The minimum alone; `sheetbend fit` also derives intervals and doubts, which takes as long again.
 
     Args:
         loss: m/s; found from the recording where it is None.

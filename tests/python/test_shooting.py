@@ -9,10 +9,14 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.config import load
+from sheetbend.doubts.missing_loss import missing_loss
+from sheetbend.doubts.other_losses import other_losses
 from sheetbend.experiment.cut import borders
-from sheetbend.minimum.continuity import with_window
+from sheetbend.minimum.continuity import joined, with_window
 from sheetbend.minimum.journal import Journal
 from sheetbend.minimum.lifted import Lifted
+from sheetbend.minimum.lifted_window import LiftedWindow, Seen
+from sheetbend.minimum.optimizers import walked
 from sheetbend.minimum.problem import FitProblem, as_parameters
 from sheetbend.statistics.chain import Chain, Gap, Window
 
@@ -57,6 +61,19 @@ def cut(e: sb.Experiment, loss: float) -> FitProblem:
     states = tuple((1.0 + 0.1 * k, -0.3 * k) for k in range(1, len(borders(e)) - 1))
     e = replace(e, shooting=replace(e.shooting, states=states))  # type: ignore[type-var]
     return FitProblem([e], as_parameters(list(WANTED), [e]))
+
+
+def counted_windows(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
+    """Grows with every evaluation of a window: whether it makes derivatives."""
+    made: list[bool] = []
+    at = LiftedWindow.at
+
+    def counted(self: LiftedWindow, u: np.ndarray, state: np.ndarray, other: Seen | None = None) -> Seen | None:
+        made.append(other is None)
+        return at(self, u, state, other)
+
+    monkeypatch.setattr(LiftedWindow, "at", counted)
+    return made
 
 
 def test_a_chain_is_solved_as_one_dense_system() -> None:
@@ -124,6 +141,20 @@ def test_the_cost_at_the_best_states_has_the_gradient_that_is_told() -> None:
         assert (costs[0] - costs[1]) / (2 * step) == pytest.approx(J[:, k] @ r, rel=1e-4)
 
 
+def test_a_cost_takes_derivatives_of_another_point_only_where_they_hold(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And is that of a point with derivatives of its own."""
+    made = counted_windows(monkeypatch)
+    first, windows = np.array([np.log(0.0032), np.log(1.5e-4), 1.0, 0.5]), 5
+    for away, most in ((1e-3, 0), (0.03, windows), (0.1, windows)):
+        own, kept = cut(swing(), 1e-2), cut(swing(), 1e-2)
+        kept.evaluate(first)
+        made.clear()
+        cost = kept.cost(first + away)
+        assert sum(made) <= most and len(made) > sum(made)
+        _, r, _ = own.evaluate(first + away)
+        assert 2 * cost == pytest.approx(r @ r, rel=1e-6)
+
+
 def test_hard_continuity_gives_the_estimate_and_the_intervals_of_one_run() -> None:
     e = swing()
     wanted = list(WANTED)
@@ -188,20 +219,48 @@ def test_a_motion_that_loses_nothing_says_so_in_every_result(tmp_path: Path) -> 
 
 
 def test_a_journal_brings_back_the_states_too(tmp_path: Path) -> None:
-    points = [np.array([np.log(0.0032) + d, np.log(1.5e-4), 1.0, 0.5]) for d in (0.0, 1e-3, -1e-3)]
-    onward = points[0] + 2e-3
-    problem = cut(swing(), 1e-3)
-    alone = [problem.evaluate(u) for u in (*points, onward)]
-    with Journal(tmp_path / "journal"):
+    """Those behind costs alone as well, which go on from derivatives of an earlier point."""
+    steps = (0.0, True), (1e-3, True), (-1e-3, True), (2e-3, False), (0.05, False), (1e-3, False)
+    first = np.array([np.log(0.0032), np.log(1.5e-4), 1.0, 0.5])
+    points = [(first + np.array([d, 0.0, 0.0, 0.0]), jacobian) for d, jacobian in steps]
+    for known in range(1, len(points)):
+        path = tmp_path / f"journal{known}"
         problem = cut(swing(), 1e-3)
-        for u in points:
-            problem.evaluate(u)
-    with Journal(tmp_path / "journal") as journal:
-        problem = cut(swing(), 1e-3)
-        resumed = [problem.evaluate(u) for u in (*points, onward)]
-        assert (journal.read, journal.made) == (len(points), 1)
-    for (_, r, J), (_, s, K) in zip(alone, resumed, strict=True):
-        assert np.array_equal(r, s) and np.array_equal(J, K)
+        alone = [problem.evaluate(*point) for point in points]
+        with Journal(path):
+            problem = cut(swing(), 1e-3)
+            for point in points[:known]:
+                problem.evaluate(*point)
+        with Journal(path) as journal:
+            problem = cut(swing(), 1e-3)
+            resumed = [problem.evaluate(*point) for point in points]
+            assert (journal.read, journal.made) == (known, len(points) - known)
+        for (_, r, J), (_, s, K) in zip(alone, resumed, strict=True):
+            assert np.array_equal(r, s) and np.array_equal(J, K)
+
+
+@pytest.mark.parametrize(
+    ("given", "shooting", "doubt"),
+    [
+        (0.0, sb.Shooting(0.8), "swing loses energy that the model does not"),
+        (6e-4, sb.Shooting(0.8, 1e-5), "the given arm_hinge_viscosity is too large: with a third of it"),
+    ],
+)
+def test_a_wrong_loss_is_doubted_after_single_steps_of_the_states(
+    given: float, shooting: sb.Shooting, doubt: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where another loss leads far off, states that follow to the end would take dozens of steps."""
+    e, wanted = swing(stop=4.0), ("arm_inertia", "arm_angle", "arm_rate")
+    e = replace(e, scene=pendulum(0.0033, given)[0], shooting=shooting)
+    parameters = as_parameters(wanted, [e])
+    experiments, at = joined([e], parameters, 1)
+    problem = FitProblem(experiments, parameters, expanded=at)
+    u = walked(problem, problem.parameters.initial(), None)
+    problem.evaluate(u)
+    made = counted_windows(monkeypatch)
+    found = missing_loss(problem, u, (problem, u)) if given == 0.0 else other_losses(problem, u)
+    assert set(found) == set(wanted) and all(words.startswith(doubt) for words in found.values())
+    assert sum(made) <= 7 * 5  # of 5 windows; 12 * 5 where they follow to the end
 
 
 def test_windows_are_refused_where_they_cannot_be() -> None:

@@ -10,6 +10,7 @@ than chance does, the model lacks a loss; where it does so backward, the model l
 
 Where driven markers are corrected, both simulations solve for their corrections. The difference, of the corrections'
 prior rows too, is then what a loss leaves that corrections do not take up, as a column of the reduced Jacobian is.
+States of motions in windows follow by one Gauss-Newton step, which is their first order.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from typing import Literal
 import numpy as np
 
 from ..arrays.timeseries import Array
+from ..experiment.cut import in_steps
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
 from .directions import Asked, clearly, rows_of, tied
@@ -86,7 +88,7 @@ def of_more_loss(problem: FitProblem, u: Array) -> Array | None:
         e if e.static else replace(e, solver=replace(e.solver, integrator=OTHER[e.solver.integrator]))
         for e in problem.experiments
     ]
-    ok_there, there, _ = problem.of(made).evaluate(u, jacobian=False)
+    ok_there, there, _ = problem.of([in_steps(e, 1) for e in made]).evaluate(u, jacobian=False)
     if not (ok and ok_there):
         return None
     change = np.zeros(len(r))

@@ -5,7 +5,7 @@ in another way: what a little of it would damp is long gone, and what fits leave
 time, so that no direction is told from chance. So fits are made with other losses: each that was given gets a third and
 three times its size, and elements that have a stiffness and no damping are given one, all together and each kind by
 itself (`absent_damping`). What two Gauss-Newton steps leave then decides: a model that is wrong in another way leaves
-nearly as much with any loss.
+nearly as much with any loss. States of motions in windows take as many steps as the parameters do.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 
 from ..arrays.timeseries import Array
 from ..errors import SheetbendError
+from ..experiment.cut import in_steps
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
 from ..statistics.gauge import RANK_TOLERANCE
@@ -56,7 +57,8 @@ def other_losses(problem: FitProblem, u: Array) -> dict[str, str]:
     ok, r, J = problem.evaluate(u)
     groups = _unexplained(problem, r) if ok and np.isfinite(J).all() else []
     best: dict[int, tuple[float, str]] = {}
-    tried = list(_tried(problem, u, groups)) if groups else []
+    stepping = problem.of([in_steps(e, 1) for e in problem.experiments])
+    tried = list(_tried(stepping, u, groups)) if groups else []
     for more, words in tried:
         after = _reached(more, u, J, groups)
         for k, group in enumerate(groups):

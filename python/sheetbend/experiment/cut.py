@@ -26,6 +26,12 @@ def shot(e: Experiment) -> Shooting | None:
     return own if isinstance(own, Shooting) and own.behind is not None else None
 
 
+def in_steps(e: Experiment, steps: int) -> Experiment:
+    """With states that take so many steps in an evaluation at most, where it is shot in windows."""
+    own = shot(e)
+    return e if own is None else replace(e, shooting=replace(own, steps=steps))
+
+
 def start_quantities(scene: Scene) -> tuple[str, ...]:
     """Names of the quantities that set places and velocities at the start and nothing else, in the scene's order."""
     start: set[str] = set()

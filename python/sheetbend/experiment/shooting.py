@@ -35,6 +35,7 @@ class Shooting:
         pace: s, by which differences of velocities are multiplied.
         states: where a search begins, (borders, quantities of the start); all three are found when a fit begins.
         is_given: whether a user gave the loss, and no fit found it.
+        steps: how many Gauss-Newton steps the states take in an evaluation, at most.
     """
 
     window: float | str = AUTO
@@ -43,6 +44,7 @@ class Shooting:
     pace: float | None = None
     states: tuple[tuple[float, ...], ...] = ()
     is_given: bool = False
+    steps: int = 30
 
     @staticmethod
     def given(name: str, wanted: object, beside: Mapping[str, bool]) -> Shooting | None:

@@ -26,7 +26,8 @@ from ..result.shot import ShotMotion
 from ..statistics.chain import Chain
 from ..statistics.covariance import autocorrelation
 from .growth import over_fit
-from .lifted import Lifted, Motion
+from .lifted import Lifted
+from .lifted_motion import Motion
 from .lifted_starts import begun
 from .optimizers import Observer, walked
 from .parts import expanded_to

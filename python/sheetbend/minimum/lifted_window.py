@@ -7,7 +7,7 @@ start of the next window, at two instants each, from which gaps between windows 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -129,29 +129,35 @@ class LiftedWindow:
         """Why the last evaluation was not ok."""
         return self._core.failure or "a residual is not finite"
 
-    def at(self, u: Array, state: Array) -> Seen | None:
-        """The window at the fit's parameters u and a state (states,); None where the motion has no answer."""
-        ok, r, J = self._core.evaluate(np.append(u[self._columns], state), True)
+    def at(self, u: Array, state: Array, other: Seen | None = None) -> Seen | None:
+        """The window at the fit's parameters u and a state (states,); None where the motion has no answer.
+
+        Args:
+            other: a point whose derivatives it takes, at a small part of the cost; None makes its own.
+        """
+        ok, r, J = self._core.evaluate(np.append(u[self._columns], state), other is None)
         if not ok or not np.isfinite(r).all() or not np.isfinite(J).all():
             return None
+        values = self._shown(r)
+        if other is not None:
+            return Seen(
+                *(replace(a, value=v) for a, v in zip((other.data, other.start, other.end), values, strict=True))
+            )
+        own = len(self._columns)
+        border = np.zeros((len(r), self._parameters))
+        border[:, self._columns] = J[:, :own]
+        return Seen(*map(Rows, values, self._shown(J[:, own:]), self._shown(border)))
 
-        def rows(which: Numbers, factor: float = 1.0) -> Rows:
-            border = np.zeros((len(which), self._parameters))
-            border[:, self._columns] = factor * J[which, : len(self._columns)]
-            return Rows(factor * r[which], factor * J[which, len(self._columns) :], border)
+    def _shown(self, every: Array) -> tuple[Array, Array, Array]:
+        """From all rows of the compiled problem those of the data, and of the states in m behind its start and end."""
 
-        def place(shown: Sequence[Numbers]) -> Rows:
+        def place(shown: Sequence[Numbers]) -> Array:
             if not shown:
-                return rows(np.zeros(0, dtype=int))
-            early, late = (rows(which, FAR / np.sqrt(self._particles)) for which in shown)
-            by = self._pace / self._behind
+                return every[:0]
+            early, late = (FAR / np.sqrt(self._particles) * every[which] for which in shown)
+            return np.concatenate([early, self._pace / self._behind * (late - early)])
 
-            def both(a: Array, b: Array) -> Array:
-                return np.concatenate([a, by * (b - a)])
-
-            return Rows(both(early.value, late.value), both(early.state, late.state), both(early.border, late.border))
-
-        return Seen(rows(self._data), place(self._start), place(self._end))
+        return every[self._data], place(self._start), place(self._end)
 
     def data(self, u: Array, state: Array) -> Rows | None:
         """Residuals alone."""
