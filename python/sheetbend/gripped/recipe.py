@@ -24,7 +24,7 @@ from ..minimum.linear_algebra import one_blas_thread
 from ..objects.chain import unit_vector
 from ..recording.recording import Recording
 from .bounds import at_bounds
-from .climb import Climb, Say
+from .climb import Climb
 from .conclusion import announced, conclude
 from .judging import predict
 from .ladder import LADDER, Rung
@@ -35,6 +35,7 @@ from .plausible import doubts, gravities
 from .screening import screened
 from .start import started
 from .steps import Step
+from .straight import Say
 from .windows import SPANS, Span, everything
 
 BENDING_LENGTHS = (0.45, 0.25, 0.12)  # m, of the starts: (EI/(density g))^(1/3), stiff first
