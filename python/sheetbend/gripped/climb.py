@@ -43,11 +43,21 @@ class Climb(Straight):
         self._recorded: dict[GrippedMotion, GrippedMotion] = {}  # by what was moved onto the axis
 
     def run(
-        self, models: Sequence[RopeModel], ladder: Sequence[Rung], bending_lengths: Sequence[float], most_links: int
+        self,
+        models: Sequence[RopeModel],
+        ladder: Sequence[Rung],
+        bending_lengths: Sequence[float],
+        most_links: int,
+        starts: int | None = None,
     ) -> None:
-        """Climb, from the best start of any of the models; Ctrl-C passes, and leaves what is finished."""
+        """Climb, from the best start of any of the models; Ctrl-C passes, and leaves what is finished.
+
+        Args:
+            starts: how many are raced; None = those of the bending lengths, one after the other.
+        """
         began = time.perf_counter()
-        self._keep(ladder[0], self._straight(models, ladder[0], bending_lengths, most_links), None, began)
+        first = self._straight(models, ladder[0], bending_lengths, most_links, starts)
+        self._keep(ladder[0], first, None, began)
         stayed = [self._climbed(rung) for rung in ladder[1:]]
         last = max((k for k, stays in enumerate(stayed) if stays), default=-1)
         dropped, late = list[Rung](), list[Rung]()
@@ -228,7 +238,7 @@ class Climb(Straight):
                 ends.append(found)
         if not ends:
             return None
-        return self._long(rung.name, min(ends, key=lambda end: end[1])[0])
+        return self._long(rung.name, min(ends, key=lambda end: end[1].cost)[0])
 
     def _long(self, name: str, rope: Rope, most: int = LONG, problem: FitProblem | None = None) -> Rope | None:
         """Fitted to long windows, and judged; None where it diverges.

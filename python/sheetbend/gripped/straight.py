@@ -9,16 +9,16 @@ from itertools import product
 import numpy as np
 
 from ..errors import SheetbendError
-from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
-from ..quantities.parameters import Parameter
+from ..result.result import Start
 from .bounds import bounded
-from .descent import bearable, descend
+from .descent import Descent, bearable, descend
 from .judging import Split, errors_of, misfits
 from .ladder import Rung
 from .model import NAME, RopeModel
 from .motion import GrippedMotion
 from .pieces import experiments_of, problem_of
+from .raced import best_of_groups, raced, rows
 from .start import about, started
 from .steps import Rope
 from .windows import Span
@@ -39,6 +39,7 @@ class Straight:
         given: all motions.
         split: what is fitted and judged; without what was left out.
         left_out: sentences on recordings that are neither fitted nor judged.
+        raced: the starts of the first rung, where they were raced.
     """
 
     def __init__(
@@ -50,16 +51,29 @@ class Straight:
         length, total = windows[-1]
         self.middle, self.longest = windows[min(1, len(windows) - 1)], (length, max(length, SEARCHED * total))
         self.left_out: list[str] = []
+        self.raced: tuple[Start, ...] = ()
 
     def _straight(
-        self, models: Sequence[RopeModel], rung: Rung, bending_lengths: Sequence[float], most_links: int
+        self,
+        models: Sequence[RopeModel],
+        rung: Rung,
+        bending_lengths: Sequence[float],
+        most_links: int,
+        count: int | None = None,
     ) -> Rope:
         """The first rung, from the best start that gets to its end.
+
+        Args:
+            count: of starts that are raced; None = those of the bending lengths, one after the other.
 
         Raises:
             SheetbendError: none does.
         """
-        for start in self._started(models, rung, bending_lengths):
+        if count is None:
+            starts = self._started(models, rung, bending_lengths)
+        else:
+            starts = self._of_groups(models, rung, bending_lengths, count)
+        for start in starts:
             try:
                 return self._refined(start, most_links)
             except SheetbendError as error:
@@ -76,16 +90,60 @@ class Straight:
             if found is None:
                 self.say(f"start at a bending length of {length:g} m: diverges")
                 continue
-            rope, cost = found
-            errors = errors_of(rope.model, rope.values, self.split, self.threads)
-            EI, middle = rope.values[f"{NAME}_EI"], float(np.median(errors.fitted))
-            self.say(f"start at a bending length of {length:g} m: EI {EI:.3g}, error {1e3 * middle:.3g} mm")
-            ends.append((middle, cost, replace(rope, errors=errors)))
+            rope, end = found
+            rope, middle = self._scored(rope, f"start at a bending length of {length:g} m")
+            ends.append((middle, end.cost, rope))
         ends.sort(key=lambda end: end[:2])
-        ropes = [rope for _, _, rope in ends]
+        return self._of_others([rope for _, _, rope in ends])
+
+    def _of_groups(
+        self, models: Sequence[RopeModel], rung: Rung, bending_lengths: Sequence[float], count: int
+    ) -> list[Rope]:
+        """Raced starts, one for each of their groups, fitted to the longest windows: best first, as `_started`."""
+        ends = []
+        for model in models:
+            firsts = [started(model, self.split.motions, length) for length in bending_lengths]
+            first = Rope(firsts[0], about(rung.wanted(self.split.fitted[0]), firsts[0]), {})
+            problem = self._problem(first, self.windows[0])
+            if not bearable(problem, problem.cost(problem.parameters.initial())):
+                problem = self._of_sound(problem, first.values) or problem
+            ended = raced(problem, [candidate.quantities for candidate in firsts], count)
+            fits, mine = dict[int, Descent](), []
+            for number, best in best_of_groups(ended).items():
+                values = problem.parameters.to_physical(best.u)
+                found = self._through(replace(first, model=first.model.at(values), values=values))
+                name = f"{sum(one.group == number for one in ended)} of {count} starts end alike"
+                if found is None:
+                    self.say(f"{name}: diverges on longer windows")
+                    continue
+                fits[number] = found[1]
+                rope, middle = self._scored(found[0], name)
+                mine.append((middle, found[1].cost, rope))
+            lost = sum(not one.group for one in ended)
+            if lost:
+                self.say(f"{lost} of {count} starts lead nowhere: the motion diverges from there")
+            ends += [(*end, rows(problem, ended, fits)) for end in mine]
+        ends.sort(key=lambda end: end[:2])
+        if ends:
+            self.raced = ends[0][-1]
+        return self._of_others([rope for _, _, rope, _ in ends])
+
+    def _through(self, rope: Rope) -> tuple[Rope, Descent] | None:
+        """Fitted to middle windows, then to the longest; None where most of these diverge."""
+        found = self._descended(rope, self.middle)
+        return None if found is None else self._descended(found[0], self.longest)
+
+    def _scored(self, rope: Rope, name: str) -> tuple[Rope, float]:
+        """The rope with its errors, told by a name, and their median."""
+        rope = self._judged(rope)
+        EI, middle = rope.values[f"{NAME}_EI"], float(np.median(rope.errors.fitted))
+        self.say(f"{name}: EI {EI:.3g}, error {1e3 * middle:.3g} mm")
+        return rope, middle
+
+    def _of_others(self, ropes: list[Rope]) -> list[Rope]:
+        """The same, once recordings are left out that none of these ropes predicts as it does the others."""
         if ropes:
-            least = np.min([rope.errors.whole for rope in ropes], axis=0)
-            self._leave_out(least)
+            self._leave_out(np.min([rope.errors.whole for rope in ropes], axis=0))
         return ropes
 
     def _refined(self, rope: Rope, most_links: int) -> Rope:
@@ -125,17 +183,16 @@ class Straight:
 
     def _descended(
         self, rope: Rope, window: Span, most: int = LONG, problem: FitProblem | None = None
-    ) -> tuple[Rope, float] | None:
-        """A rope and its cost after a descent on the windows that do not diverge at first; None where most do."""
+    ) -> tuple[Rope, Descent] | None:
+        """A rope and its descent on the windows that do not diverge at first; None where most do."""
         problem = problem or self._problem(rope, window)
         end = descend(problem, most, ENOUGH)
         if not end.finite:
-            free = list(problem.given.values())
-            sound = self._sound(problem.experiments, free, rope.values)
-            if 2 * len(sound) <= len(problem.experiments):
+            sound = self._of_sound(problem, rope.values)
+            if sound is None:
                 return None
-            end = descend(problem_of(sound, free, rope.values, self.threads), most, ENOUGH)
-        return (Rope(rope.model.at(end.values), rope.parameters, end.values), end.cost) if end.finite else None
+            end = descend(sound, most, ENOUGH)
+        return (Rope(rope.model.at(end.values), rope.parameters, end.values), end) if end.finite else None
 
     def _problem(self, rope: Rope, window: Span) -> FitProblem:
         """The least-squares problem of windows of what is fitted, which starts at the rope's values."""
@@ -143,13 +200,14 @@ class Straight:
         free = bounded(rope.parameters, rope.model, self.split.fitted, window[0])
         return problem_of(experiments, free, rope.values, self.threads)
 
-    def _sound(
-        self, experiments: Sequence[Experiment], parameters: Sequence[Parameter], values: Mapping[str, float]
-    ) -> list[Experiment]:
-        """Those that do not diverge at these values."""
-        problems = (problem_of([e], parameters, values) for e in experiments)
-        sound = [bearable(p, p.cost(p.parameters.initial())) for p in problems]
-        return [e for e, ok in zip(experiments, sound, strict=True) if ok]
+    def _of_sound(self, problem: FitProblem, values: Mapping[str, float]) -> FitProblem | None:
+        """The problem of those windows that do not diverge at these values; None where most do."""
+        free = list(problem.given.values())
+        each = [problem_of([e], free, values) for e in problem.experiments]
+        sound = [
+            e for e, p in zip(problem.experiments, each, strict=True) if bearable(p, p.cost(p.parameters.initial()))
+        ]
+        return problem_of(sound, free, values, self.threads) if 2 * len(sound) > len(each) else None
 
     def _judged(self, rope: Rope) -> Rope:
         return replace(rope, errors=errors_of(rope.model, rope.values, self.split, self.threads))
