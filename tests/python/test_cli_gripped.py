@@ -162,20 +162,20 @@ class TestFit:
         assert run("fit", config).exit_code == 0
         assert sorted(smoothed) == ["00", "00", "01", "02"]
 
-    def test_nominal_directions_and_the_density_s_deviation_are_the_fits(
+    def test_nominal_directions_starts_and_the_density_s_deviation_are_the_fits(
         self, config: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        more = '"rope_1/eval"\nnominal = [[2, 0, -2], [1, 0, 1]]\ndensity_sd = 0.02'
+        more = '"rope_1/eval"\nnominal = [[2, 0, -2], [1, 0, 1]]\nstarts = 16\ndensity_sd = 0.02'
         edited(config, ('"rope_1/eval"', more))
         given = []
 
         def noted(*arguments: Any, **options: Any) -> Any:
-            given.append((options["nominal"], options["given"]))
+            given.append((options["nominal"], options["starts"], options["given"]))
             raise KeyboardInterrupt
 
         monkeypatch.setattr(gripped, "fit_rope", noted)
         run("fit", config, "--json")
-        assert given == [(([2, 0, -2], [1, 0, 1]), {"rope_density": 0.02})]
+        assert given == [(([2, 0, -2], [1, 0, 1]), 16, {"rope_density": 0.02})]
 
     @pytest.mark.slow
     def test_without_eval_there_is_nothing_to_score(self, config: Path) -> None:
@@ -353,6 +353,7 @@ BAD = [
     ("density = 0.045", "density = 0.045\nEI = 1.0", "gripped_rope[0].EI", "density"),
     ("bending_lengths", "bending_length", "gripped_rope[0].bending_length", "did you mean 'bending_lengths'"),
     ("[0.12]", "[]", "gripped_rope[0].bending_lengths", "at least 1"),
+    ("bending_lengths = [0.12]", "starts = 0", "gripped_rope[0].starts", "at least 1"),
     ("[0.12]", "[0.1, -1.0]", "gripped_rope[0].bending_lengths[1]", "greater than 0"),
     ("[0.5, 1.5]", "[1.5, 0.5]", "gripped_rope[0].windows[0]", "length <= total"),
     ("[0.5, 1.5]", "[0.5]", "gripped_rope[0].windows[0]", "at least 2"),
@@ -361,7 +362,8 @@ BAD = [
     ('["twist", "tilts"]', '["twist", "twist"]', "gripped_rope[0].rungs", "each once"),
     ('["twist", "tilts"]', '["twist", "friction"]', "gripped_rope[0].rungs[1]", "'varying'"),
     ("[fit]\n", "[scene]\n[fit]\n", "scene", "gripped_rope"),
-    ("without_twist = false", "starts = []", "fit.starts", "threads"),
+    ("without_twist = false", "start = []", "fit.start", "threads"),
+    ("without_twist = false", "starts = 32", "fit", "write starts in [[gripped_rope]]"),
     ("density = 0.045", "density = 0.045\nnominal = [[1, 0, -1]]", "gripped_rope[0].nominal", "[start, end]"),
     ("density = 0.045", "density = 0.045\nnominal = [[1, 0, -1], [0, 0, 0]]", "gripped_rope[0].nominal", "a length"),
     ("density = 0.045", "density = 0.045\nnominal = [[1, 0], [1, 0, 1]]", "gripped_rope[0].nominal[0]", "at least 3"),

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import sheetbend as sb
 from pytest import approx
+from sheetbend.doubts import driven_errors as module
 from sheetbend.doubts.driven_errors import _KNOWN, driven_errors
 from sheetbend.minimum.problem import FitProblem, as_parameters
 from sheetbend.statistics.blocks import contradiction
@@ -140,3 +143,15 @@ def test_noise_that_no_interval_feels_costs_eight_draws() -> None:
         (more,) = _KNOWN[problem].values()
         assert len(more) == 24 * felt
         np.testing.assert_array_equal(more[:8], first)
+
+
+def test_what_the_parameters_span_is_found_once_for_all_experiments(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Once for each: of 56 windows of a rope that took as long as ten of their derivatives."""
+    made: list[int] = []
+    found = module._basis
+    monkeypatch.setattr(module, "_basis", lambda J: made.append(len(J)) or found(J))
+    experiments = [replace(swung(CASE, 1), name=f"{k}") for k in range(3)]
+    problem = FitProblem(experiments, as_parameters(START, experiments))
+    u = problem.parameters.to_internal({f"rope_{name}": value for name, value in TRUE.items()})
+    together = driven_errors(problem, u, 8)
+    assert made == [problem.core.rows] and (together != 0.0).any(axis=0).all()

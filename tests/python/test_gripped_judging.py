@@ -91,6 +91,16 @@ class TestSplit:
         split = Split.of(self.motions(count), 0.25)
         assert (len(split.judged), split.cut, split.pieces) == (judged, cut, pieces)
 
+    def test_of_many_recordings_some_wait(self) -> None:
+        """Of 56 recordings all were predicted after every rung, though the windows of a fit are of six."""
+        motions = self.motions(32)
+        split = Split.of(motions, 0.25)
+        assert (len(split.fitted), len(split.judged), len(split.waiting)) == (18, 8, 6)
+        assert sorted(int(m.recording.name) for m in (*split.motions, *split.waiting)) == list(range(32))
+        smaller = split.without({0})
+        assert smaller.fitted == split.fitted[1:] and smaller.waiting == split.waiting
+        assert Split.of(motions[:24], 0.25).waiting == ()
+
     def test_what_is_left_out_is_neither_fitted_nor_judged(self) -> None:
         split = Split.of(self.motions(8), 0.25)
         smaller = split.without({0, 7})

@@ -11,7 +11,8 @@ import sheetbend as sb
 from sheetbend.gripped import GrippedMotion, RopeModel
 from sheetbend.gripped import slid as slid_before
 from sheetbend.gripped.judging import predict
-from sheetbend.gripped.slid import MODES, noise, slid, window_of
+from sheetbend.gripped.slid import MODES, MORE, STEPS, noise, slid, window_of
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.report.scores import coordinate_error
 from test_gripped_motion import carried_about, model_of, simulated
 
@@ -126,3 +127,17 @@ def test_what_a_rung_adds_at_zero_leaves_what_had_slid_as_it_is() -> None:
     motion, remembering = recorded(HISTORY), replace(MODEL, slid_modes=MODES)
     larger = replace(remembering, tilts=True, shifts=True, places=True, curvature_modes=(0, 3), softness_modes=(1, 2))
     assert slid(larger, motion, 0.0, {}) == slid(remembering, motion, 0.0, {})
+
+
+def test_each_step_takes_one_derivative(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One more was made after the last step, and not used."""
+    asked: list[bool] = []
+    evaluate = FitProblem.evaluate
+
+    def counted(problem: FitProblem, u: np.ndarray, jacobian: bool = True) -> tuple[bool, np.ndarray, np.ndarray]:
+        asked.append(jacobian)
+        return evaluate(problem, u, jacobian)
+
+    monkeypatch.setattr(FitProblem, "evaluate", counted)
+    slid(replace(MODEL, slid_modes=MODES), recorded(HISTORY), 0.0, {})
+    assert 1 <= asked.count(True) <= STEPS + MORE and not asked[-1]

@@ -180,6 +180,7 @@ def _fit(console: Console, config: GrippedConfig, rope: RopeData, ladder: Sequen
         ladder=ladder,
         validate=s.validate_share,
         bending_lengths=s.bending_lengths,
+        starts=s.starts,
         windows="all" if s.windows == "all" else [(length, total) for length, total in s.windows],
         segments=s.segments,
         max_segments=s.max_segments,

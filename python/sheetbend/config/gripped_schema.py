@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from ..gripped import fit_rope
+from ..minimum.starts import MOST
 from .schema import ExperimentSection, OutputSection
 from .section import MOST_LINKS, Finite, Name, Pair, Section, Vector, key
 
@@ -111,6 +112,14 @@ class GrippedRopeSection(Section):
     bending_lengths: list[Positive] = key(
         _default("bending_lengths"), "of the starts, (EI/(density g))^(1/3); the best one wins", "m", min_length=1
     )
+    starts: int | None = key(
+        _default("starts"),
+        "number of starts, raced on the shortest windows: those of `bending_lengths`, and others drawn over two "
+        "decades about the middle one; the best of each group that ends in the same minimum is fitted to whole "
+        "recordings, and the one that predicts best goes on. When left out, those of `bending_lengths` alone",
+        ge=1,
+        le=MOST,
+    )
     segments: int = key(_default("segments"), "links at the start", ge=4, le=MOST_LINKS)
     max_segments: int = key(
         _default("max_segments"), "links are doubled, up to these, until EI moves by less than 5 %", ge=4
@@ -155,6 +164,13 @@ class GrippedFitSection(Section):
         False, "also fit, with the same rungs, a rope of negligible torsional stiffness, to show what twist explains"
     )
     strict: bool = key(False, "exit 3 when any parameter is not identifiable, not only when all are")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _starts_of_a_rope(cls, given: Any) -> Any:
+        if isinstance(given, dict) and "starts" in given:
+            raise ValueError("has starts, which are a key of each rope here|write starts in [[gripped_rope]]")
+        return given
 
 
 class GrippedConfig(Section):

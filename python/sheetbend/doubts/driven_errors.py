@@ -97,6 +97,7 @@ def drawn_noise(problem: FitProblem, u: Array, draws: int) -> DrivenErrors | Non
     if not known:
         return None
     driven = problem.of([_following_all(e) if i in known else e for i, e in enumerate(problem.experiments)])
+    basis = _basis(problem.evaluate(u)[2])
     flat: dict[int, Array] = {}
     size: dict[int, float] = {}
     moved: dict[int, Array] = {}
@@ -104,7 +105,7 @@ def drawn_noise(problem: FitProblem, u: Array, draws: int) -> DrivenErrors | Non
         correction = driven.experiments[i].correction(problem.recordings[i])
         assert correction is not None  # it follows all that is driven
         made = np.ascontiguousarray(n[:, : correction.knots]).reshape(draws, -1)
-        responses = _responses(problem, driven, i, u, made)
+        responses = _responses(problem, driven, i, u, made, basis)
         if responses is None:
             continue
         flat[i], moved[i], e = made, responses, problem.experiments[i]
@@ -112,7 +113,7 @@ def drawn_noise(problem: FitProblem, u: Array, draws: int) -> DrivenErrors | Non
         size[i] = _noise_of_markers(e) or float(np.sqrt(np.mean(n[:, :, places] ** 2)))
     if not moved:
         return None
-    believed = _believed(problem, u, moved)
+    believed = _believed(problem, u, moved, basis)
     return DrivenErrors(driven, flat, size, {i: believed[i] * m for i, m in moved.items()}, believed)
 
 
@@ -120,19 +121,23 @@ _KNOWN: WeakKeyDictionary[FitProblem, dict[tuple[int, bytes], Array]] = WeakKeyD
 """Responses to the first draws, which are the same however many are asked for."""
 
 
-def _responses(problem: FitProblem, driven: FitProblem, i: int, u: Array, draws: Array) -> Array | None:
+def _responses(problem: FitProblem, driven: FitProblem, i: int, u: Array, draws: Array, basis: Array) -> Array | None:
     """(draws, data rows of the i-th experiment) what draws of the noise do to the residuals at u; None where no
     interval would feel it. The part of A n that parameters can take up, over the residuals' size, is what it moves
-    them in standard errors, and |A n| is the most that it can move anything."""
+    them in standard errors, and |A n| is the most that it can move anything.
+
+    Args:
+        basis: of what the columns of the Jacobian at u span (`_basis`), which is dear to make.
+    """
     known = _KNOWN.setdefault(problem, {})
     key, rows = (i, u.tobytes()), problem.core.first_rows
     found = known.get(key)
     if found is None:
         found = np.asarray(driven.core.respond(i, u, draws[:PACK]))
-        _, r, J = problem.evaluate(u)
+        _, r, _ = problem.evaluate(u)
         own = slice(rows[i], rows[i + 1])
         left = np.sqrt(_square(r[own]))
-        taken = np.linalg.norm(found @ _basis(J)[own], axis=1)
+        taken = np.linalg.norm(found @ basis[own], axis=1)
         if np.sqrt(_square(taken)) < UNFELT * left and np.linalg.norm(found, axis=1).max() < left:
             found = np.zeros((0, rows[i + 1] - rows[i]))
         known[key] = found
@@ -143,12 +148,11 @@ def _responses(problem: FitProblem, driven: FitProblem, i: int, u: Array, draws:
     return found[: len(draws)]
 
 
-def _believed(problem: FitProblem, u: Array, moved: Mapping[int, Array]) -> dict[int, float]:
+def _believed(problem: FitProblem, u: Array, moved: Mapping[int, Array], basis: Array) -> dict[int, float]:
     """By place of the experiment, the part of the responses that fits into what the fit leaves, 1 at most. Parameters
     take some of either up."""
-    _, r, J = problem.evaluate(u)
-    rows, basis = problem.core.first_rows, _basis(J)
-    found = {}
+    _, r, _ = problem.evaluate(u)
+    rows, found = problem.core.first_rows, {}
     for i, errors in moved.items():
         own = slice(rows[i], rows[i + 1])
         beside = errors - (errors @ basis[own]) @ basis[own].T

@@ -19,7 +19,7 @@ from ..minimum.problem import FitProblem
 from ..quantities.parameters import Parameter
 from ..quantities.wording import short
 from .bounds import bounded
-from .climb import FINE, Climb
+from .climb import Climb
 from .descent import bearable, descend, negligible
 from .ladder import TWIST, Rung
 from .model import NAME, RopeModel
@@ -29,6 +29,7 @@ from .over_density import as_quantities
 from .pieces import experiments_of, problem_of, starting
 from .start import whole
 from .steps import Rope
+from .straight import FINE
 from .windows import Span, counted, places
 
 MOST = 30  # iterations, at most
@@ -63,7 +64,7 @@ def conclude(
             few = climb.windows[-1]
             if len(places(motions, few)) < len(experiments):  # most of the way at a part of the price
                 values = _at_the_end(climb, values, experiments_of(rope.model, motions, few, values), parameters)
-            values = _at_the_end(climb, values, experiments, parameters)
+            values = _at_the_end(climb, values, experiments, parameters, sure=False)  # `fit` goes on from there
         except KeyboardInterrupt:
             interrupted = True
             say("interrupted: the fit that counts did not get to its end")
@@ -95,14 +96,18 @@ def conclude(
 
 
 def _at_the_end(
-    climb: Climb, values: Mapping[str, float], experiments: Sequence[Experiment], parameters: Sequence[Parameter]
+    climb: Climb,
+    values: Mapping[str, float],
+    experiments: Sequence[Experiment],
+    parameters: Sequence[Parameter],
+    sure: bool = True,
 ) -> dict[str, float]:
     """Values at the minimum.
 
     Raises:
         SheetbendError: the motion diverges.
     """
-    found = descend(experiments, parameters, values, MOST, climb.threads)
+    found = descend(problem_of(experiments, parameters, values, climb.threads), MOST, sure=sure)
     if not found.finite:
         raise SheetbendError("the fit that counts diverges where the last rung ended")
     climb.say(f"{'ended' if found.ended else 'not ended'} after {found.iterations} steps")

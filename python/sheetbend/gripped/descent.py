@@ -8,19 +8,16 @@ descent ends where the next step promises less than a tenth.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..arrays.timeseries import Array
-from ..experiment.experiment import Experiment
 from ..minimum.approach import Approach
 from ..minimum.optimizers import ROUNDING, STUCK
 from ..minimum.problem import FitProblem
-from ..quantities.parameters import Parameter
 from .model import NAME
-from .pieces import problem_of
 
 DISTANCE = 0.1  # standard deviations to the minimum, of a parameter, at which a descent has ended
 ALIKE = 20.0  # frames over which residuals of a moving rope are alike, at least
@@ -112,22 +109,21 @@ def bearable(problem: FitProblem, cost: float) -> bool:
 
 
 def descend(
-    experiments: Sequence[Experiment],
-    parameters: Sequence[Parameter],
-    values: Mapping[str, float],
+    problem: FitProblem,
     most: int,
-    threads: int = 1,
     enough: float = 0.0,
+    sure: bool = True,
     followed: Callable[[int, float], None] = lambda iteration, cost: None,
 ) -> Descent:
-    """Down from `values`; a state that diverges costs infinitely much, so that the last finite one stays.
+    """Down from where the problem starts; a state that diverges costs infinitely much, so that the last finite one
+    stays.
 
     Args:
         most: steps that follow a derivative of their own.
         enough: share of the cost that a step must promise and take off, where that is more than `negligible`.
+        sure: whether the last step has to follow a derivative of its own; not where another search goes on from there.
         followed: called with each step's number and cost.
     """
-    problem = problem_of(experiments, parameters, values, threads)
     walk = Sparing(problem, problem.parameters.initial())
     least, ended, first = max(enough, negligible(problem)), False, walk.cost
     if not bearable(problem, walk.cost):
@@ -138,7 +134,7 @@ def descend(
             break
         followed(walk.iterations, walk.cost)
         if walk.promised < least or walk.taken < enough:
-            if walk.sure:
+            if walk.sure or not sure:
                 ended = True
                 break
             walk.renew()

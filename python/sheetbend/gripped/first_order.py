@@ -15,39 +15,29 @@ import numpy as np
 from ..minimum.approach import RIDGE, inside
 from ..minimum.coordinates import step_limits
 from ..minimum.problem import FitProblem
-from ..quantities.parameters import Parameter
 from .judging import Errors, Split, Verdict, verdict
 from .model import RopeModel
 from .motion import Array
-from .pieces import experiments_of, numbered, problem_of
+from .pieces import numbered, problem_of
 from .slid import window_of
-from .windows import Span
 
 PART = 1e-3  # of the step, along which the recordings that judge change
 
 
 def first_order(
-    larger: RopeModel,
-    parameters: Sequence[Parameter],
-    values: Mapping[str, float],
-    split: Split,
-    window: Span,
-    threads: int = 1,
+    fitted: FitProblem, larger: RopeModel, values: Mapping[str, float], split: Split, threads: int = 1
 ) -> Verdict | None:
     """The verdict on one step of a model that starts where a smaller one is; None where there is nothing to judge by,
     or no answer.
 
     Args:
-        parameters: of the larger model.
+        fitted: of windows of what is fitted, with the larger model.
         values: of the smaller one.
-        window: of the fitted recordings.
     """
     if not split.judged:
         return None
-    fitted = problem_of(experiments_of(larger, split.fitted, window, values), parameters, values, threads)
-    judged = problem_of(
-        numbered([window_of(larger, m, None, values) for m in split.judged]), parameters, values, threads
-    )
+    windows = [window_of(larger, m, None, values) for m in split.judged]
+    judged = problem_of(numbered(windows), list(fitted.given.values()), values, threads)
     u = fitted.parameters.initial()
     (ok, r, J), (answers, r2, _) = fitted.evaluate(u), judged.evaluate(u, jacobian=False)
     if not (ok and answers and np.isfinite(J).all()):

@@ -26,6 +26,7 @@ BETTER = 0.99  # median ratio of errors on what was not fitted, below which a la
 EQUAL = 0.03  # by which the median ratio of models that predict equally well differs from 1
 LUCK = 1 / 3  # probability of so many better ones by chance, above which they show nothing
 PIECES = 4  # at least, that a verdict rests on
+FITTED = 18  # recordings, at most, that rungs are fitted to: their windows are of no more
 FAR = 2.0  # error over the median, beyond which a recording does not belong
 SPREAD = 4.0  # standard deviations of the logarithms of errors (from their median), likewise
 GIVEN = 2  # frames that a prediction starts from
@@ -42,23 +43,31 @@ class Split:
         since: frames of each of these from which on it is judged. Of a recording that is cut in time the first part is
             predicted too: what slides inside a rope has a history, and a motion cannot start in its middle.
         pieces: in time, by which each is judged, so that few recordings give a verdict too.
+        waiting: of many motions, those that are neither fitted nor judged before the fit that counts.
     """
 
     fitted: tuple[GrippedMotion, ...]
     judged: tuple[GrippedMotion, ...]
     since: tuple[int, ...]
     pieces: int
+    waiting: tuple[GrippedMotion, ...] = ()
 
     @classmethod
     def of(cls, motions: Sequence[GrippedMotion], share: float) -> Split:
-        """About that share of the motions, or of the time of each, is judged (`split`)."""
+        """About that share of the motions, or of the time of each, is judged (`split`). Of the others no more than
+        `FITTED` are fitted, spread evenly; the rest waits."""
         fitted, judged = split(motions, share)
-        since = [GIVEN] * len(judged)
+        since, waiting = [GIVEN] * len(judged), list[GrippedMotion]()
         if judged and not any(fitted[0] is m for m in motions):
             shown = [len(part.recording.times) for part in fitted]
             halves = [(m, n) for m, n in zip(motions, shown, strict=True) if n < len(m.recording.times)]
             judged, since = [m for m, _ in halves], [n for _, n in halves]
-        return cls(tuple(fitted), tuple(judged), tuple(since), -(-PIECES // max(len(judged), 1)))
+        elif len(fitted) > FITTED:
+            chosen = set(np.linspace(0, len(fitted) - 1, FITTED).astype(int).tolist())
+            waiting = [m for k, m in enumerate(fitted) if k not in chosen]
+            fitted = [m for k, m in enumerate(fitted) if k in chosen]
+        pieces = -(-PIECES // max(len(judged), 1))
+        return cls(tuple(fitted), tuple(judged), tuple(since), pieces, tuple(waiting))
 
     @property
     def cut(self) -> bool:
@@ -78,7 +87,7 @@ class Split:
         judged, since = tuple(self.judged[k] for k in kept), tuple(self.since[k] for k in kept)
         if self.judged and not judged and len(fitted) > 1:
             fitted, judged, since = fitted[:-1], fitted[-1:], (GIVEN,)
-        return Split(fitted, judged, since, -(-PIECES // max(len(judged), 1)))
+        return replace(self, fitted=fitted, judged=judged, since=since, pieces=-(-PIECES // max(len(judged), 1)))
 
 
 @dataclass(frozen=True)

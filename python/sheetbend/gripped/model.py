@@ -77,6 +77,11 @@ class RopeModel:
         known = {key.removeprefix(f"{NAME}_"): value for key, value in fitted.items()}
         return replace(self, values={k: known.get(k, v) for k, v in self.values.items()})
 
+    @property
+    def quantities(self) -> dict[str, float]:
+        """Its starting values by the names of quantities, `rope_<option>`."""
+        return {f"{NAME}_{option}": value for option, value in self.values.items() if value is not None}
+
     def scene(self, motion: GrippedMotion, first: int, last: int) -> Scene:
         """The rope as it is in frame `first`, with the grips' motion until frame `last`."""
         scene = Scene(NAME, motion.recording.gravity if motion.recording.gravity is not None else self.gravity)

@@ -21,10 +21,11 @@ from ..errors import InputError
 from ..fitting.fit import Fit
 from ..minimum.journal import journaled
 from ..minimum.linear_algebra import one_blas_thread
+from ..minimum.starts import check_count
 from ..objects.chain import unit_vector
 from ..recording.recording import Recording
 from .bounds import at_bounds
-from .climb import Climb, Say
+from .climb import Climb
 from .conclusion import announced, conclude
 from .judging import predict
 from .ladder import LADDER, Rung
@@ -35,6 +36,7 @@ from .plausible import doubts, gravities
 from .screening import screened
 from .start import started
 from .steps import Step
+from .straight import Say
 from .windows import SPANS, Span, everything
 
 BENDING_LENGTHS = (0.45, 0.25, 0.12)  # m, of the starts: (EI/(density g))^(1/3), stiff first
@@ -89,6 +91,7 @@ def fit_rope(
     ladder: Sequence[Rung] = LADDER,
     validate: float = 0.25,
     bending_lengths: Sequence[float] = BENDING_LENGTHS,
+    starts: int | None = None,
     windows: Sequence[Span] | Literal["all"] = SPANS,
     segments: int = 12,
     max_segments: int = 48,
@@ -116,6 +119,10 @@ def fit_rope(
         validate: share of the recordings that decide whether a rung stays, and that no rung is fitted to; where that is
             none, the share of the time of each recording, its end. The last fit sees all. At 0 what is fitted decides.
         bending_lengths: m, of the starts.
+        starts: number of starts, which are raced on the shortest windows: those of `bending_lengths`, and others drawn
+            over two decades about the middle one. One of each group that ends in the same minimum is fitted to whole
+            recordings, and the climb goes on from the one that predicts best; all are in the result. None = those of
+            `bending_lengths` alone, one after the other.
         windows: (length, total) in s: each fit sees windows of this length, of about this total, the last one those of
             the last entry (half as many decide on rungs). "all" = the default ones, but the last fit sees every window
             of all recordings; its expected time is said before work starts.
@@ -150,6 +157,8 @@ def fit_rope(
         raise InputError("marker_mass", "needs the rope's density", marker_mass, fix)
     if not recordings:
         raise InputError("recordings", "are empty", 0, "give at least one")
+    if starts is not None:
+        check_count(starts)
     if not 0 <= validate < 1:
         raise InputError("validate", "must be a share below 1", validate, "give such as 0.25")
     if density is None:
@@ -181,7 +190,7 @@ def fit_rope(
         say(announced(begun, ladder, motions, everything(motions, spans[-1][0]), threads))
     climb, interrupted = Climb(motions, validate, spans, threads, say), False
     try:
-        climb.run([replace(model, gravity=g) for g in meant], ladder, bending_lengths, max_segments)
+        climb.run([replace(model, gravity=g) for g in meant], ladder, bending_lengths, max_segments, starts)
     except KeyboardInterrupt:
         if climb.rope is None:
             raise
@@ -193,6 +202,8 @@ def fit_rope(
     if marker_mass is None:
         sds[DENSITY] = math.hypot(sds.get(DENSITY, 0.0), MARKERS_UNKNOWN)
     found, spread = conclude(climb, kept, last, sds, interrupted)
+    if climb.raced:
+        found = replace(found, result=replace(found.result, starts=climb.raced))
     assert climb.rope is not None
     rope, values = climb.rope, {**found.values, **found.on_mesh}  # of the model's own mesh
     warnings = (

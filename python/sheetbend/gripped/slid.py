@@ -117,8 +117,10 @@ def _searched(problem: FitProblem, size: Array, at: Array, steps: int) -> Array:
     Joints slide or hold, so the residuals have kinks: a step counts only if it lowers what it is to lower.
     """
     spread = FIRST
-    ok, r, J = problem.evaluate(size * at)
-    for _ in range(steps if ok else 0):
+    for _ in range(steps):
+        ok, r, J = problem.evaluate(size * at)
+        if not ok:
+            break
         likely, spread = _likely(J * size, r - J @ (size * at), spread)
         before = r @ r + at @ at / spread**2
         for part in PARTS:
@@ -129,7 +131,6 @@ def _searched(problem: FitProblem, size: Array, at: Array, steps: int) -> Array:
         else:
             break
         at = tried
-        ok, r, J = problem.evaluate(size * at)
     return at
 
 

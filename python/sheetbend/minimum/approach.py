@@ -21,6 +21,7 @@ from ..arrays.timeseries import Array
 from ..quantities.parameters import Parameters
 from .coordinates import Coordinates
 from .counts import counted
+from .triangle import triangle
 
 RIDGE = 1e-3  # of the cost: what a parameter's longest step must promise to be worth taking
 GOOD, POOR = 0.75, 0.25  # of the decrease that the linear model promises
@@ -151,7 +152,7 @@ def inside(J: Array, r: Array, ridge: Array, lower: Array, upper: Array) -> Arra
         J, r, ridge: (rows, n), (rows,), (n,).
     """
     n = J.shape[1]
-    R = np.asarray(np.linalg.qr(np.column_stack([J, r]), mode="r"))[:n]  # its last column is Q'r
+    R = triangle(np.column_stack([J, r]))[:n]  # its last column is Q'r
     A = np.concatenate([R[:, :n], np.diag(ridge)])
     b = np.concatenate([-R[:, n], np.zeros(n)])
     s, held = np.zeros(n), np.zeros(n, dtype=bool)

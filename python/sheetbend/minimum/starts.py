@@ -22,6 +22,12 @@ OFF = 0.05  # of the range: so far from a bound a start is moved
 SEED = 25
 
 
+def check_count(count: int, or_else: str = "") -> None:
+    """Raises InputError where it is no number of starts, from 1 to `MOST`; `or_else`: what may stand there instead."""
+    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST:
+        raise InputError("starts", f"must be a number of starts{or_else}", count, f"give 1 to {MOST}")
+
+
 def drawn(parameters: Parameters, count: int) -> list[Array]:
     """Starts (free,) in internal coordinates: the initial one, and count - 1 drawn ones. The same every time.
 
@@ -29,8 +35,7 @@ def drawn(parameters: Parameters, count: int) -> list[Array]:
         InputError: the count is no number from 1 to `MOST`.
         MissingExtraError: SciPy is not installed.
     """
-    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST:
-        raise InputError("starts", "must be a number of starts or a list of them", count, f"give 1 to {MOST}")
+    check_count(count, " or a list of them")
     first = parameters.initial()
     if count == 1:
         return [first]
