@@ -4,13 +4,14 @@ What a little more loss changes is known to first order (`missing_loss`, `held_l
 in another way: what a little of it would damp is long gone, and what fits leave without it is large and alike over
 time, so that no direction is told from chance. So fits are made with other losses: each that was given gets a third and
 three times its size, and elements that have a stiffness and no damping are given one, all together and each kind by
-itself (`absent_damping`). What two Gauss-Newton steps leave then decides: a model that is wrong in another way leaves
-nearly as much with any loss. States of motions in windows take as many steps as the parameters do.
+itself (`absent_damping`). Contacts that come to rest at once are given a restitution (`absent_bounce`). What two
+Gauss-Newton steps leave then decides: a model that is wrong in another way leaves nearly as much with any loss. States
+of motions in windows take as many steps as the parameters do.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,10 +22,14 @@ from ..experiment.cut import in_steps
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
 from ..statistics.gauge import RANK_TOLERANCE
+from .absent_bounce import SIZES as BOUNCES
+from .absent_bounce import has_no_bounce, with_bounce
 from .absent_damping import FRAMES, undamped, with_damping
 from .directions import LEVEL, chance_of_drop, noise_in, rows_of, tied
 from .held_losses import held_names, of_size
 
+Says = Callable[[Sequence[str], str], str]
+"""What it says of the model that another loss leaves less: by names of motions, and by how much less."""
 SIZES = {1 / 3: ("large", "a third"), 3.0: ("small", "three times")}  # of given losses, and what their ends are told
 LEAVES = 0.2  # of the noise: a fit that leaves less beyond it lacks nothing that could be told
 LESS = 0.6
@@ -56,20 +61,23 @@ def other_losses(problem: FitProblem, u: Array) -> dict[str, str]:
     """
     ok, r, J = problem.evaluate(u)
     groups = _unexplained(problem, r) if ok and np.isfinite(J).all() else []
-    best: dict[int, tuple[float, str]] = {}
+    best: dict[int, tuple[float, Says]] = {}
     stepping = problem.of([in_steps(e, 1) for e in problem.experiments])
     tried = list(_tried(stepping, u, groups)) if groups else []
-    for more, words in tried:
+    for more, says in tried:
         after = _reached(more, u, J, groups)
         for k, group in enumerate(groups):
-            if after is None or (share := _less(group, after)) <= max(LESS, best.get(k, (0.0, ""))[0]):
+            if after is None or (share := _less(group, after)) <= max(LESS, (best[k][0] if k in best else 0.0)):
                 continue
             drop = group.left - float(after[group.mine] @ after[group.mine])
             if chance_of_drop(problem, u, after, group.mine, drop) < LEVEL / len(tried):
-                best[k] = share, words
+                best[k] = share, says
     return {
-        name: _words([problem.experiments[i].name for i in groups[k].motions], words, share)
-        for k, (share, words) in best.items()
+        name: says(
+            [problem.experiments[i].name for i in groups[k].motions],
+            f"would leave {short(100 * min(share, 1.0), 2)} % less beyond noise",
+        )
+        for k, (share, says) in best.items()
         for i in groups[k].motions
         for name in problem.acting_on(problem.experiments[i])
     }
@@ -87,18 +95,20 @@ def _unexplained(problem: FitProblem, r: Array) -> list[_Group]:
     return groups
 
 
-def _tried(problem: FitProblem, u: Array, groups: list[_Group]) -> Iterator[tuple[FitProblem, str]]:
+def _tried(problem: FitProblem, u: Array, groups: list[_Group]) -> Iterator[tuple[FitProblem, Says]]:
     """Problems with other losses, and what it says of the model if one of them leaves less."""
-    scenes = [problem.experiments[i].scene for group in groups for i in group.motions]
+    motions = [problem.experiments[i] for group in groups for i in group.motions]
+    scenes = [e.scene for e in motions]
     for name in held_names(problem):
         if any(name in scene.quantities for scene in scenes):
             for times, (size, share) in SIZES.items():
-                words = f"the given {name} is too {size}: with {share} of it the fit"
-                yield of_size(problem, name, times), words
+                yield of_size(problem, name, times), _is_given(name, size, share)
     bare = list(dict.fromkeys(scene.groups[k].name for scene in scenes for k in undamped(scene)))
     for only in (*([""] if bare else []), *(bare if len(bare) > 1 else [])):
         for frames in FRAMES:
-            yield with_damping(problem, u, frames, only), f"with damping{f' of {only}' if only else ''} the fit"
+            yield with_damping(problem, u, frames, only), _lacks_damping(only)
+    for restitution in BOUNCES if any(map(has_no_bounce, motions)) else ():
+        yield with_bounce(problem, restitution), _lacks_bounce(restitution)
 
 
 def _reached(more: FitProblem, u: Array, J: Array, groups: list[_Group]) -> Array | None:
@@ -134,11 +144,20 @@ def _less(group: _Group, after: Array) -> float:
     return (group.left - float(after[group.mine] @ after[group.mine])) / (group.left - group.noise)
 
 
-def _words(names: list[str], given: str, share: float) -> str:
-    percent = f"{short(100 * min(share, 1.0), 2)} % less beyond noise"
-    if not given.startswith("with"):
-        return f"{given} would leave {percent}. Free it, or measure it"
-    return (
-        f"{f'{names[0]} loses' if len(names) == 1 else 'the recordings lose'} energy that the model does not: {given} "
-        f"would leave {percent}. Give the model the loss that it lacks (such as bend_damping or membrane_damping)"
+def _is_given(name: str, size: str, share: str) -> Says:
+    return lambda _, less: f"the given {name} is too {size}: with {share} of it the fit {less}. Free it, or measure it"
+
+
+def _lacks_damping(only: str) -> Says:
+    return lambda names, less: (
+        f"{f'{names[0]} loses' if len(names) == 1 else 'the recordings lose'} energy that the model does not: with "
+        f"damping{f' of {only}' if only else ''} the fit {less}. Give the model the loss that it lacks (such as "
+        "bend_damping or membrane_damping)"
+    )
+
+
+def _lacks_bounce(restitution: float) -> Says:
+    return lambda names, less: (
+        f"{f'{names[0]} bounces' if len(names) == 1 else 'the recordings bounce'} where the model comes to rest: with "
+        f"a restitution of {short(restitution, 2)} the fit {less}. Give it to the contact, and fit it"
     )

@@ -1,0 +1,36 @@
+"""Restitution of contacts that a model gives none, at some sizes of it.
+
+A little of it changes nothing: an approach that would leave slower than what gravity adds in two substeps comes to
+rest. So there is no derivative at zero, and sizes are tried.
+"""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+
+from ..experiment.experiment import Experiment
+from ..minimum.problem import FitProblem
+from ..quantities.quantities import Term
+
+SIZES = tuple(k / 10 for k in range(1, 10))
+
+
+def has_no_bounce(e: Experiment) -> bool:
+    """Whether an experiment has contacts with colliders, and all of them come to rest."""
+    contacts = e.scene.contacts.contacts
+    return not e.static and bool(contacts) and not any(c.bounces or c.dissipates for c in contacts)
+
+
+def with_bounce(problem: FitProblem, restitution: float) -> FitProblem:
+    """The problem with a restitution of all contacts of those motions that have none."""
+    return problem.of([_bouncing(e, restitution) if has_no_bounce(e) else e for e in problem.experiments])
+
+
+def _bouncing(e: Experiment, restitution: float) -> Experiment:
+    scene = e.scene.shallow()
+    scene.contacts = copy.copy(e.scene.contacts)
+    scene.contacts.contacts = [replace(c, bounces=True) for c in e.scene.contacts.contacts]
+    more = [Term("restitution", k, restitution, ()) for k in range(len(scene.contacts.contacts))]
+    scene.terms = [*e.scene.terms, *more]
+    return replace(e, scene=scene)
