@@ -155,6 +155,26 @@ class TestImpossible:
         found, notes = mended(recorded(changed), INNER)
         assert np.isnan(found.positions[150:, 4]).all() and np.isfinite(found.positions[:150, 4]).all() and notes
 
+    @pytest.mark.parametrize("away", [0.06, 0.3])
+    def test_a_free_marker_that_goes_elsewhere_and_comes_back_is_not_seen_there(self, away: float) -> None:
+        """Once it was believed there where it was so near that a fast marker gets there between two frames."""
+        changed = moving()
+        changed[140:160, 5] += (away, 0.0, 0.0)
+        found, (note,) = mended(recorded(changed), INNER)
+        assert np.isnan(found.positions[140:160, 5]).all() and np.isnan(found.positions).sum() == 60
+        assert "m5 jumped elsewhere from frame 140 to 159" in note
+
+    def test_numbers_that_repeat_from_a_moving_frame_on_are_cut_off(self) -> None:
+        """A recording whose last second repeats one frame once was one of a rope that is stopped in the air."""
+        changed = moving()
+        changed[190:] = changed[189]
+        found, (note,) = mended(recorded(changed), INNER)
+        assert "all markers stood still although the rope moved from frame 190 (1.9 s) on: not used there" in note
+        (motion,) = screened([recorded(changed)], 0.0)
+        assert len(motion.recording.times) == 190 and np.isfinite(found.positions[:190]).all()
+        ended = np.concatenate([moving()[:189], np.repeat(moving()[188:189], 3, axis=0)])
+        assert mended(recorded(ended), INNER)[1] == ()  # too short to tell
+
     def test_frozen_tracking_is_not_used(self) -> None:
         changed = moving()
         changed[100:130, 5] = changed[100, 5]

@@ -28,6 +28,7 @@ STRETCHED = 2.0  # by which their distance changes at most in that
 FORGOTTEN = 0.1  # s, after which directions are not compared any more
 SHORTER = 0.8  # links beside two neighbors, exchanged over given, that exchange them throughout; at an end `end_links`
 JUMP = 0.05  # of the rope's length, from one frame to the next beyond the usual way: no marker of a rope does that
+AWAY = 0.5  # of the larger of two jumps, that their sum is where a marker goes elsewhere and comes back
 SUDDEN = 200.0  # m/s^2, the same for frames that are far apart in time
 REPEATS, LASTS = 5, 0.05  # frames and s of equal numbers that count as frozen
 STEP = 5e-3  # m, that a frozen marker goes at once before or after
@@ -52,6 +53,7 @@ def mended(
     positions, words = _in_order(recording, inner, usual)
     words = _each(recording, lost, "lay exactly at the origin") + words
     frozen = np.stack([_frozen(times, positions[:, k]) for k in tracks], axis=1) & ~_resting(positions)[:, None]
+    frozen |= _stopped(times, positions)[:, None]
     positions[frozen] = np.nan
     stray = np.stack([_elsewhere(times, positions[:, k], least) for k in tracks], axis=1)
     positions[stray] = np.nan
@@ -66,9 +68,12 @@ def steadied_order(recording: Recording) -> tuple[Array, Mask]:
     """Positions (frames, markers, 3) m with the same order of neighbors in all frames, that of most frames, and NaN in
     place of zeros; (pairs, frames) where a pair was exchanged for that."""
     positions = np.where(_lost(recording)[:, :, None], np.nan, recording.positions)
-    wrong = np.zeros((positions.shape[1] - 1, len(positions)), dtype=bool)
+    wrong, least = (
+        np.zeros((positions.shape[1] - 1, len(positions)), dtype=bool),
+        _least_jump(recording.times, positions),
+    )
     for k in range(len(wrong)):
-        state = _turned(recording.times, positions[:, k + 1] - positions[:, k])
+        state = _turned(recording.times, positions[:, k], positions[:, k + 1], least)
         wrong[k] = state if 2 * state.sum() <= len(state) else ~state
         _exchange(positions, k, wrong[k])
     return positions, wrong
@@ -93,9 +98,10 @@ def _in_order(recording: Recording, inner: tuple[int, int], usual: Array | None)
     return positions, words
 
 
-def _turned(times: Array, along: Array) -> Mask:
-    """(frames,) whether two neighbors are the other way round than in the first frame, from one to the other (frames,
-    3)."""
+def _turned(times: Array, first: Array, second: Array, least: float) -> Mask:
+    """(frames,) whether two neighbors (frames, 3) are the other way round than in the first frame. The place halfway
+    between them does not jump where they are exchanged, as it does where one of them is seen elsewhere."""
+    along, middle = second - first, 0.5 * (first + second)
     seen = np.flatnonzero(np.isfinite(along[:, 0]))
     distance = np.maximum(np.linalg.norm(along[seen], axis=1), np.finfo(float).tiny)
     d = along[seen] / distance[:, None]
@@ -104,8 +110,19 @@ def _turned(times: Array, along: Array) -> Mask:
         ((d[1:] * d[:-1]).sum(axis=1) < TURNED)
         & (np.abs(np.diff(np.log(distance))) < np.log(STRETCHED))
         & (np.diff(times[seen]) <= FORGOTTEN)
+        & (np.linalg.norm(_leaps(times[seen], middle[seen]), axis=1) <= least)
     )
     return np.asarray(np.cumsum(turned) % 2 == 1)
+
+
+def _leaps(times: Array, track: Array) -> Array:
+    """(frames - 1, 3) by how much each step of a track (frames, 3) goes beyond its usual way."""
+    apart = np.diff(times)[:, None]
+    if not len(apart):
+        return np.zeros((0, 3))
+    velocity = np.diff(track, axis=0) / apart
+    usual = np.median(np.lib.stride_tricks.sliding_window_view(np.pad(velocity, ((2, 2), (0, 0)), "edge"), 5, 0), -1)
+    return np.asarray((velocity - usual) * apart)
 
 
 def _throughout(positions: Array, inner: tuple[int, int], usual: Array | None) -> tuple[list[int], dict[int, EndLink]]:
@@ -177,12 +194,31 @@ def _frozen(times: Array, track: Array) -> Mask:
 
 def _resting(positions: Array) -> Mask:
     """(frames,) before and after the motion, in which every marker that is seen repeats."""
-    same = ((np.diff(positions, axis=0) == 0.0) | np.isnan(np.diff(positions, axis=0))).all(axis=(1, 2))
     resting = np.zeros(len(positions), dtype=bool)
-    for first, last in _runs(same):
+    for first, last in _runs(_same(positions)):
         if first == 0 or last == len(positions) - 1:
             resting[first : last + 1] = True
     return resting
+
+
+def _stopped(times: Array, positions: Array) -> Mask:
+    """(frames,) at the end, in which every marker repeats although the frame before shows one moving: no rope stops at
+    once."""
+    stopped, runs = np.zeros(len(times), dtype=bool), list(_runs(_same(positions)))
+    if not runs or len(runs) > HELD:
+        return stopped
+    first, last = runs[-1]
+    long = last - first + 1 >= REPEATS and times[last] - times[first] >= LASTS
+    if last == len(times) - 1 and first > 0 and long:
+        step = np.linalg.norm(positions[first] - positions[first - 1], axis=1)
+        stopped[first + 1 :] = (step > STEP).any()
+    return stopped
+
+
+def _same(positions: Array) -> Mask:
+    """(steps,) in which every marker that is seen repeats."""
+    step = np.diff(positions, axis=0)
+    return np.asarray(((step == 0.0) | np.isnan(step)).all(axis=(1, 2)))
 
 
 def _least_jump(times: Array, positions: Array) -> float:
@@ -199,25 +235,30 @@ def _elsewhere(times: Array, track: Array, least: float) -> Mask:
     if len(seen) < 6:
         return stray
     x, t = track[seen], times[seen]
-    velocity = np.diff(x, axis=0) / np.diff(t)[:, None]
-    usual = np.median(np.lib.stride_tricks.sliding_window_view(np.pad(velocity, ((2, 2), (0, 0)), "edge"), 5, 0), -1)
-    jumps = np.linalg.norm(velocity - usual, axis=1) * np.diff(t) > least
-    bounds = [0, *(np.flatnonzero(jumps) + 1).tolist(), len(seen)]
+    leaps, speed = _leaps(t, x), np.linalg.norm(np.diff(x, axis=0), axis=1) / np.diff(t)
+    bounds = [0, *(np.flatnonzero(np.linalg.norm(leaps, axis=1) > least) + 1).tolist(), len(seen)]
     stretches = list(pairwise(bounds))
     best = max(range(len(stretches)), key=lambda i: stretches[i][1] - stretches[i][0])
-    fastest = float(np.linalg.norm(velocity[stretches[best][0] : stretches[best][1] - 1], axis=1).max(initial=0.0))
+    fastest = float(speed[stretches[best][0] : stretches[best][1] - 1].max(initial=0.0))
 
     def reached(a: int, b: int) -> bool:
         return bool(np.linalg.norm(x[a] - x[b]) <= least + fastest * abs(t[a] - t[b]))
 
+    def returned(a: int, b: int) -> bool:
+        """Whether the jump into a stretch and the one out of it cancel: no rope makes either."""
+        if a == 0 or b == len(seen):
+            return False
+        there, back = leaps[a - 1], leaps[b - 1]
+        return bool(np.linalg.norm(there + back) < AWAY * max(np.linalg.norm(there), np.linalg.norm(back)))
+
     first, last = stretches[best]
     good = [stretches[best]]
     for a, b in stretches[best + 1 :]:
-        if reached(last - 1, a):
+        if reached(last - 1, a) and not returned(a, b):
             last = b
             good.append((a, b))
     for a, b in reversed(stretches[:best]):
-        if reached(first, b - 1):
+        if reached(first, b - 1) and not returned(a, b):
             first = a
             good.append((a, b))
     stray[seen] = True
@@ -237,7 +278,11 @@ def _each(recording: Recording, where: Mask, what: str) -> list[str]:
     names: dict[str, list[str]] = {}
     for k in np.flatnonzero(where.any(axis=0)):
         names.setdefault(_when(recording, where[:, k]), []).append(recording.markers[k])
-    return [f"{', '.join(those)} {what} {when}: not used there" for when, those in names.items()]
+    count = len(recording.markers)
+    return [
+        f"{', '.join(those) if len(those) < count else 'all markers'} {what} {when}: not used there"
+        for when, those in names.items()
+    ]
 
 
 def _when(recording: Recording, frames: Mask) -> str:
