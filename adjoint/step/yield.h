@@ -24,19 +24,21 @@ void let_slide_vjp(const Scene& scene, const Inputs<const T>& in, const T* state
     T* p_bar = in_bar.of(Quantity::rest) + value;
     const SlidingSpring<K, T> at(scene, group, item, p, state);
     const auto nodes = group.nodes(item);
-    T* set_bar = x_bar + scene.first_dof[nodes[K::arity - 1]];
+    const auto set = nodes.last(set_nodes<K>);
+    const auto set_bar = [&](int j) -> T& { return x_bar[scene.first_dof[set[j / 3]] + j % 3]; };
     T along(0.0), e_bar[K::rows];
-    for (int j = 0; j < K::rows; ++j) along += at.e[j] * set_bar[j];
+    for (int j = 0; j < K::rows; ++j) along += at.e[j] * set_bar(j);
     along *= at.inverse_length;
     p_bar[K::yield_parameter] -= along;
     for (int j = 0; j < K::rows; ++j)
-      e_bar[j] = at.f * set_bar[j] + at.y_over_length * at.inverse_length * along * at.e[j];
+      e_bar[j] = at.f * set_bar(j) + at.y_over_length * at.inverse_length * along * at.e[j];
+    leave_shape<K>(e_bar);
 
     // de/dset = -1; with a share e = C - (1 - share) set, where C holds -share set: by the share 0
     T by_x[K::dofs]{}, by_p[parameter_count<K>]{};
     values_vjp<Slider<K>>(at.x, p, e_bar, by_x, by_p);
-    for (int d = 0; d < K::dofs - 3; ++d) x_bar[scene.first_dof[nodes[d / 3]] + d % 3] += by_x[d];
-    for (int j = 0; j < K::rows; ++j) set_bar[j] -= e_bar[j];
+    for (int d = 0; d < at.set; ++d) x_bar[scene.first_dof[nodes[d / 3]] + d % 3] += by_x[d];
+    for (int j = 0; j < K::rows; ++j) set_bar(j) -= e_bar[j];
     if constexpr (shares_load<K>) by_p[K::share_parameter] = T(0.0);
     for (int k = 0; k < parameter_count<K>; ++k) p_bar[k] += by_p[k];
   });

@@ -35,6 +35,7 @@
 #include "core/constraints/twist.h"
 #include "core/constraints/yielding_curvature.h"
 #include "core/constraints/yielding_sheet_curvature.h"
+#include "core/constraints/yielding_solid_strain.h"
 
 namespace sheetbend {
 
@@ -77,7 +78,8 @@ using Registry = std::tuple<   //
     TetrahedronStrain,         //
     TetrahedronVolume,         //
     BrickNeoHookean,           //
-    TetrahedronNeoHookean>;
+    TetrahedronNeoHookean,     //
+    YieldingBrickStrain>;
 
 inline constexpr int kind_count = std::tuple_size_v<Registry>;
 

@@ -10,7 +10,10 @@
 //
 // An element has one constraint per quadrature point: eight of a brick (2 x 2 x 2 of Gauss), one of a tetrahedron.
 // Degenerate: nothing in space, an element that is turned inside out has finite strain; couplings without a positive definite compliance are no number.
+// UncoupledRows have the usual values and no parameters.
 #pragma once
+
+#include <numbers>
 
 #include "core/constraints/solid_element.h"
 #include "core/scalar/dual.h"
@@ -20,6 +23,7 @@ namespace sheetbend {
 // The rows of the strains (E_11, E_22, E_33, 2 E_23, 2 E_13, 2 E_12): a lower triangle, and a factor for each shear.
 template <class T>
 struct SolidRows {
+  static constexpr int parameters = 8;
   T normal[6], shear[3];  // triangle(j) + c
 
   // p: n12, n13, n23, r_2, r_3, r_23, r_13, r_12. The triangle is the inverse of the Cholesky factor of (1, -n12, -n13; .., 1, -n23; .., .., 1).
@@ -51,9 +55,24 @@ struct SolidRows {
       e[3 + c] = shear[c] * C[3 + c];
     }
   }
+
+ protected:
+  SolidRows() = default;
 };
 
-template <int N>
+template <class T>
+struct UncoupledRows : SolidRows<T> {
+  static constexpr int parameters = 0;
+
+  explicit UncoupledRows(const T*) {
+    for (int j = 0; j < 3; ++j) {
+      for (int c = 0; c <= j; ++c) this->normal[triangle(j) + c] = T(c == j ? 1.0 : 0.0);
+      this->shear[j] = T(std::numbers::sqrt2 / 2.0);
+    }
+  }
+};
+
+template <int N, template <class> class Rows = SolidRows>
 struct SolidStrain : SolidElement<N> {
   static constexpr int rows = 6, dofs = 3 * N;
   using Element = SolidElement<N>;
@@ -66,7 +85,7 @@ struct SolidStrain : SolidElement<N> {
   struct Factors {
     T C[rows], N_[N][3];  // gradients, the first node's too
     Vec3<T> F[3];         // F's columns
-    SolidRows<T> M;
+    Rows<T> M;
 
     Factors(const T* x, const T* p) : M(p + gradients) {
       for (int a = 0; a < 3; ++a) {
@@ -166,8 +185,7 @@ struct SolidStrain : SolidElement<N> {
   // Of v_j . J_j - y_j C_j, summed over rows, as a sum over strains c of X_c (a's derivative) - Y_c (b's derivative + e_c), with X = M^T dl and Y = M^T y.
   template <class T>
   static void reverse(const T* x, const T* p, const T* dl, const T* y, const T* a, const T* b, T* x_bar, T* p_bar) {
-    const T half(0.5), one(1.0);
-    const SolidRows<T> M(p + gradients);
+    const Rows<T> M(p + gradients);
     T X[rows], Y[rows];
     M.transpose_times(dl, X);
     M.transpose_times(y, Y);
@@ -182,7 +200,31 @@ struct SolidStrain : SolidElement<N> {
       Element::add_reverse(i, x, p, a, b, bar, to, of, x_bar, p_bar);
     }
 
-    // dQ/dM_jc, through M's derivatives
+    if constexpr (Rows<T>::parameters > 0) add_reverse_of_rows(M, F, A, B, p, dl, y, p_bar);
+  }
+
+  template <class T>
+  static void add_hessian(const T*, const T* p, const T* lambda, T* H) {
+    T L[rows], N_[N][3];
+    Rows<T>(p + gradients).transpose_times(lambda, L);
+    for (int a = 0; a < 3; ++a) Element::find_gradients(p, N_, a);
+    for (int i = 0; i < N; ++i) {
+      T by[3];
+      for (int b = 0; b < 3; ++b)
+        by[b] = L[component[0][b]] * N_[i][0] + L[component[1][b]] * N_[i][1] + L[component[2][b]] * N_[i][2];
+      for (int k = 0; k <= i; ++k) {
+        const T same = by[0] * N_[k][0] + by[1] * N_[k][1] + by[2] * N_[k][2];
+        for (int a = 0; a < 3; ++a) H[triangle(3 * i + a) + 3 * k + a] += same;
+      }
+    }
+  }
+
+ private:
+  // dQ/dM_jc, through M's derivatives.
+  template <class T>
+  static void add_reverse_of_rows(const Rows<T>& M, const Vec3<T>* F, const Vec3<T>* A, const Vec3<T>* B, const T* p,
+                                  const T* dl, const T* y, T* p_bar) {
+    const T half(0.5), one(1.0);
     T of_a[rows], of_b[rows];
     for (int c = 0; c < rows; ++c) {
       const int i = first[c], k = second[c];
@@ -206,23 +248,6 @@ struct SolidStrain : SolidElement<N> {
     }
   }
 
-  template <class T>
-  static void add_hessian(const T*, const T* p, const T* lambda, T* H) {
-    T L[rows], N_[N][3];
-    SolidRows<T>(p + gradients).transpose_times(lambda, L);
-    for (int a = 0; a < 3; ++a) Element::find_gradients(p, N_, a);
-    for (int i = 0; i < N; ++i) {
-      T by[3];
-      for (int b = 0; b < 3; ++b)
-        by[b] = L[component[0][b]] * N_[i][0] + L[component[1][b]] * N_[i][1] + L[component[2][b]] * N_[i][2];
-      for (int k = 0; k <= i; ++k) {
-        const T same = by[0] * N_[k][0] + by[1] * N_[k][1] + by[2] * N_[k][2];
-        for (int a = 0; a < 3; ++a) H[triangle(3 * i + a) + 3 * k + a] += same;
-      }
-    }
-  }
-
- private:
   // sum_b e_ab v_b of the symmetric matrix of strains e.
   template <class T>
   static Vec3<T> mixed(const T* e, const Vec3<T>* v, int a) {

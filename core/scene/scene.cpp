@@ -204,7 +204,8 @@ Scene build_scene(const SceneSpec& spec) {
     with_kind(built.kind, [&]<class K>(K) {
       if constexpr (Yields<K>) {
         s.yields = true;
-        for (int i = 0; i < built.count; ++i) s.is_place[built.nodes(i)[K::arity - 1]] = false;
+        for (int i = 0; i < built.count; ++i)
+          for (const int node : built.nodes(i).last(set_nodes<K>)) s.is_place[node] = false;
       }
     });
     s.rows += built.count * built.rows;

@@ -2,7 +2,8 @@
 //
 //   set' = set + f e,   f = max(0, 1 - y/|e|)        (return mapping of a circular yield surface: Simo & Hughes 1998, sec. 3.3)
 //
-// e = C - (1 - share) set for a kind with a spring beside it (yielding_curvature.h), otherwise C of the kind's Slider (friction_hinge.h);
+// e = C - (1 - share) set for a kind with a spring beside it (yielding_curvature.h), of which the deviator where shape alone yields
+// (yielding_solid_strain.h); otherwise C of the kind's Slider (friction_hinge.h);
 // evaluated at the state that the substep has found. The branch is taken by the values alone, so the reverse repeats it.
 #pragma once
 
@@ -30,9 +31,18 @@ using Slider = typename SliderOf<K>::type;
 template <class K>
 inline constexpr bool shares_load = requires { K::share_parameter; };
 
+// Leaves the deviator of a strain whose first three rows are the normal ones, where the kind yields in shape alone.
+template <class K, class T>
+void leave_shape(T* e) {
+  if constexpr (requires { K::yields_in_shape; }) {
+    const T mean = T(1.0 / 3.0) * (e[0] + e[1] + e[2]);
+    for (int j = 0; j < 3; ++j) e[j] = e[j] - mean;
+  }
+}
+
 template <class K, class T>
 struct SlidingSpring {
-  static constexpr int set = K::dofs - 3;
+  static constexpr int set = K::dofs - 3 * set_nodes<K>;
   T x[K::dofs], C[K::rows], J[K::rows * K::dofs], e[K::rows];
   decltype(T() > T()) slides;  // per lane
   T f, y_over_length, inverse_length;
@@ -46,12 +56,13 @@ struct SlidingSpring {
     for (int d = 0; d < K::dofs; ++d) x[d] = at(d);
     Slider<K>::evaluate(x, p, C, J);
     const T one(1.0), y = p[K::yield_parameter];
-    T length2(0.0);
     for (int j = 0; j < K::rows; ++j) {
       e[j] = C[j];
-      if constexpr (shares_load<K>) e[j] = C[j] - (one - p[K::share_parameter]) * x[set + j];
-      length2 += e[j] * e[j];
+      if constexpr (shares_load<K>) e[j] = C[j] - (one - K::share(p)) * x[set + j];
     }
+    leave_shape<K>(e);
+    T length2(0.0);
+    for (int j = 0; j < K::rows; ++j) length2 += e[j] * e[j];
     slides = length2 > y * y;
     inverse_length = select(slides, one / sqrt(select(slides, length2, one)), T(0.0));
     y_over_length = y * inverse_length;
@@ -75,8 +86,8 @@ void let_slide(const Scene& scene, const Inputs<const T>& in, T* state) {
   if (!scene.yields) return;
   for_each_yielding(scene, [&]<class K>(K, const Group& group, int item, std::size_t value) {
     const SlidingSpring<K, T> at(scene, group, item, in.of(Quantity::rest) + value, state);
-    T* set = state + scene.first_dof[group.nodes(item)[K::arity - 1]];
-    for (int j = 0; j < K::rows; ++j) set[j] += at.f * at.e[j];
+    const auto set = group.nodes(item).last(set_nodes<K>);
+    for (int j = 0; j < K::rows; ++j) state[scene.first_dof[set[j / 3]] + j % 3] += at.f * at.e[j];
   });
 }
 
@@ -87,7 +98,7 @@ void let_slide(const Scene& scene, const Inputs<const Dual<double, N>>& in, Dual
   if (!scene.yields) return;
   for_each_yielding(scene, [&]<class K>(K, const Group& group, int item, std::size_t value) {
     using Sliding = Slider<K>;
-    constexpr int P = parameter_count<K>, inside = P - Sliding::offsets, set = K::dofs - 3;
+    constexpr int P = parameter_count<K>, inside = P - Sliding::offsets, set = K::dofs - 3 * set_nodes<K>;
     const Directed* p = in.of(Quantity::rest) + value;
     const auto nodes = group.nodes(item);
     const auto at = [&](int d) -> Directed& { return state[scene.first_dof[nodes[d / 3]] + d % 3]; };
@@ -102,7 +113,7 @@ void let_slide(const Scene& scene, const Inputs<const Dual<double, N>>& in, Dual
     for (int k = 0; k < P; ++k) pd[k].v = own[k];
     for (int k = 0; k < inside; ++k) pd[k].d[k] = 1.0;
     Sliding::evaluate(xd, pd, C, J);
-    Directed e[K::rows], length2;
+    Directed e[K::rows];
     for (int j = 0; j < K::rows; ++j) {
       e[j].v = values.C[j];
       for (int i = 0; i < N; ++i) {
@@ -112,9 +123,11 @@ void let_slide(const Scene& scene, const Inputs<const Dual<double, N>>& in, Dual
         for (int d = 0; d < K::dofs; ++d) sum += values.J[j * K::dofs + d] * at(d).d[i];
         e[j].d[i] = sum;
       }
-      if constexpr (shares_load<K>) e[j] -= (Directed(1.0) - p[K::share_parameter]) * at(set + j);
-      length2 += e[j] * e[j];
+      if constexpr (shares_load<K>) e[j] -= (Directed(1.0) - K::share(p)) * at(set + j);
     }
+    leave_shape<K>(e);
+    Directed length2;
+    for (int j = 0; j < K::rows; ++j) length2 += e[j] * e[j];
     // in the order of SlidingSpring, so that the values have its bits
     const Directed f = Directed(1.0) - p[K::yield_parameter] * (Directed(1.0) / sqrt(length2));
     for (int j = 0; j < K::rows; ++j) at(set + j) += f * e[j];

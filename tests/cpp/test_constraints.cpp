@@ -36,7 +36,7 @@ template <class K, class T>
 
 template <class K>
 Kind kind_of() {
-  constexpr int spatial = Yields<K> || has_dial<K> ? K::dofs - 3 : K::dofs;
+  constexpr int numbers = Yields<K> ? set_nodes<K> : has_dial<K> ? 1 : 0, spatial = K::dofs - 3 * numbers;
   Kind kind{.name = K::name,
             .rows = K::rows,
             .dofs = K::dofs,

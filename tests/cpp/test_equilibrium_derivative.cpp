@@ -67,8 +67,9 @@ AtRest every_kind() {
       for (int k = 0; k + K::points <= n + 1; ++k)
         for (int i = 0; i < K::arity; ++i) {
           const int past = i - K::points;  // directors, then a set
-          const bool is_set = Yields<K> && i == K::arity - 1;
-          group.stencil.push_back(past < 0 ? k + i : is_set ? sets + k : directors + k + past);
+          const int of_set = i - (K::arity - set_nodes<K>);
+          const bool is_set = Yields<K> && of_set >= 0;
+          group.stencil.push_back(past < 0 ? k + i : is_set ? sets + k + of_set : directors + k + past);
         }
     spec.groups.push_back(group);
   });

@@ -55,6 +55,12 @@ class SolidSection(Section):
     volume_row: bool | None = key(
         None, "one row for the volume of each element, which lets bricks bend; by default where poisson is positive"
     )
+    yield_stress: Finite | None = key(
+        None, "stress in tension beyond which bricks keep a deformation (von Mises)", "Pa", gt=0
+    )
+    hardening: Finite | None = key(
+        None, "rise of the yield stress per plastic strain, kinematic; left out: perfectly plastic", "Pa", gt=0
+    )
     pinned: list[str] = key([], "sets of vertices that are held where they start")
     set: list[SolidSet] = key([], "further sets")
 

@@ -20,6 +20,7 @@ from .locking import LockingWarning, locking
 from .solid_clusters import SHARE, SolidClusters, volumes_of
 from .solid_rows import Orthotropic, SolidRows
 from .stiffness_field import StiffnessField
+from .yielding import check_plastic
 
 SolidLaw = Literal["strain", "neo_hookean"]
 
@@ -100,6 +101,8 @@ def add_solid(
     damping: float | None = None,
     law: SolidLaw = "strain",
     volume_row: bool | None = None,
+    yield_stress: float | None = None,
+    hardening: float | None = None,
     held: ArrayLike = (),
     positions: ArrayLike | None = None,
     velocities: ArrayLike | None = None,
@@ -107,7 +110,7 @@ def add_solid(
     """Add a solid to a scene. docs/solids.md has the law and its limits.
 
     Quantities: `<material>_density` kg/m^3, `<material>_E` Pa, `<material>_poisson`, and where given
-    `<material>_damping` s.
+    `<material>_damping` s, `<material>_yield_stress` Pa and `<material>_hardening` Pa.
 
     The energy is mu V tr E^2 at the quadrature points, in Green strain, or that of rubber, and lambda V (J - 1)^2/2
     with one mean J = V/V0 of an element. Solids need method "newton", "newton_cg" or "implicit"; "direct" and
@@ -133,6 +136,11 @@ def add_solid(
         volume_row: one row for the volume of an element, which lets nearly incompressible bricks bend; `poisson` is
             then between 0 and 0.5. Without it the energy has lambda (tr E)^2/2 at the quadrature points instead, and
             `poisson` may be negative. By default where `poisson` is positive.
+        yield_stress: Pa, the stress in tension beyond which the material keeps a deformation (von Mises), of bricks
+            with law "strain" and a volume row. Methods "newton", "newton_cg", "direct" and "gauss_seidel" take it.
+        hardening: Pa, H, how much the yield stress rises per plastic strain in tension; it then falls as much in
+            compression (kinematic hardening). Beyond yield a bar's stress goes on with the slope E H/(E + H). Without
+            it the material is perfectly plastic.
         held: vertices that will be pinned or driven: elements among them alone are left out.
         positions: (vertices, 3) m, the initial shape; that of the mesh by default.
         velocities: (vertices, 3) m/s at the start; zero by default.
@@ -144,6 +152,7 @@ def add_solid(
         SceneError: wrong or missing values, or others than those of a solid of the same material before.
     """
     numbers = _checked_numbers(name, density, E, poisson, orthotropic, clusters, damping, law, volume_row)
+    numbers |= check_plastic(name, yield_stress, hardening, mesh, numbers)
     _check_modes(name, stiffness_modes, clusters, E)
     material = material or name
     _check_material(scene, name, material, numbers)
@@ -168,7 +177,7 @@ def add_solid(
         SolidRows(scene, mesh, name, material, particles, free).add_orthotropic(orthotropic, damping)
     else:
         rows = SolidRows(scene, mesh, name, material, particles, free)
-        rows.add(numbers["E"], numbers["poisson"], damping, law, numbers["volume_row"])
+        rows.add(numbers["E"], numbers["poisson"], damping, law, numbers["volume_row"], yield_stress, hardening)
     built = Solid(name, mesh, particles, material, numbers, field)
     scene.solids[name] = built
     return built

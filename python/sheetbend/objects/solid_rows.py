@@ -16,6 +16,7 @@ from ..scene.scene import Array, Scene
 from .chain import first_value
 
 STRAIN = {8: "brick_strain", 4: "tetrahedron_strain"}
+YIELDING = "yielding_brick_strain"
 RUBBER = {8: "brick_neo_hookean", 4: "tetrahedron_neo_hookean"}
 VOLUME = {8: "brick_volume", 4: "tetrahedron_volume"}
 PAIRS = ("23", "13", "12")
@@ -83,15 +84,24 @@ class SolidRows:
         self.mesh = mesh
         self.E, self.nu, self.tau = (f"{material}_{label}" for label in ("E", "poisson", "damping"))
 
-    def add(self, E: float, poisson: float, damping: float | None, law: str, by_row: bool) -> None:
-        """An isotropic material, its volume in a row of its own or in the strains."""
+    def add(
+        self,
+        E: float,
+        poisson: float,
+        damping: float | None,
+        law: str,
+        by_row: bool,
+        yield_stress: float | None = None,
+        hardening: float | None = None,
+    ) -> None:
+        """An isotropic material, its volume in a row of its own or in the strains; with a row it may yield."""
         limits = (0.0, 0.5) if by_row else (-1.0, 0.5)
         self.scene.add_quantity(self.E, E, "Pa", shared=True)
         self.scene.add_quantity(self.nu, poisson, "", positive=False, scale=0.1, limits=limits, shared=True)
         if damping is not None:
             self.scene.add_quantity(self.tau, damping, "s", shared=True)
         if by_row:
-            self._beside_volume(damping is not None, law)
+            self._beside_volume(damping is not None, law, yield_stress, hardening)
         else:
             self._alone(damping is not None)
 
@@ -132,17 +142,39 @@ class SolidRows:
         width = 3 * (self.mesh.elements.shape[1] - 1) + len(USUAL)
         return at, volume, first_value(self.scene, f"{self.name}_strain") + width * np.arange(len(volume))
 
-    def _points(self, kinds: Mapping[int, str], damped: bool, axes: Array, more: Array) -> tuple[Array, Array]:
-        """Adds a constraint at every quadrature point, with the gradients along axes and more parameters; returns them
-        and their volumes."""
+    def _yielding(self, damped: bool, stress: float, hardening: float | None) -> tuple[Array, Array]:
+        """Adds the strains of what yields, with its quantities and zero compliance; returns them and their volumes.
+        Their last parameters are H/(3 mu) and s sqrt(2/3)/(2 mu), with 2 mu = E/(1 + nu) (yielding_solid_strain.h)."""
+        at, volume = self._points({8: YIELDING}, damped, WORLD, np.array([0.0, 1.0]), sets=2)
+        rest = self.scene.groups[-1].rest
+        last = first_value(self.scene, f"{self.name}_strain") + rest.shape[1] * np.arange(1, len(rest) + 1) - 1
+        rest[:, -2:] = 0.0  # the terms make them
+        made = [(last, "yield_stress", stress, np.sqrt(2.0 / 3.0))]
+        if hardening is not None:
+            made.append((last - 1, "hardening", hardening, 2.0 / 3.0))
+        E, nu = (self.E, "inverse"), (self.nu, "identity")
+        for places, label, value, factor in made:
+            own = (self.scene.add_quantity(f"{self.material}_{label}", value, "Pa", shared=True), "identity")
+            self.scene.add_terms([Term("rest", places, factor, (own, E)), Term("rest", places, factor, (own, E, nu))])
+        return at, volume
+
+    def _points(
+        self, kinds: Mapping[int, str], damped: bool, axes: Array, more: Array, sets: int = 0
+    ) -> tuple[Array, Array]:
+        """Adds a constraint at every quadrature point, with the gradients along axes, more parameters and so many
+        nodes for its set; returns them and their volumes."""
         gradients, volumes, _ = (part[self.kept] for part in self.mesh.points)
         gradients = gradients @ axes
         count, points, nodes, _ = gradients.shape
         rest = gradients[:, :, 1:].reshape(count * points, 3 * (nodes - 1))
+        stencils = np.repeat(self.nodes, points, axis=0)
+        if sets:
+            hidden = self.scene.add_hidden(np.zeros((sets * len(rest), 3)), 1.0, pinned=True)
+            stencils = np.hstack([stencils, hidden.reshape(-1, sets)])
         at = self._group(
             kinds[nodes],
             f"{self.name}_strain",
-            np.repeat(self.nodes, points, axis=0),
+            stencils,
             damped,
             np.hstack([rest, np.broadcast_to(more, (len(rest), len(more)))]),
         )
@@ -156,12 +188,14 @@ class SolidRows:
         first: int = self.scene.group(name)[1]
         return first + np.arange(len(stencils))
 
-    def _beside_volume(self, damped: bool, law: str) -> None:
+    def _beside_volume(self, damped: bool, law: str, stress: float | None, hardening: float | None) -> None:
         """mu V tr E^2 + lambda V (J - 1)^2/2, 2 mu = E/(1 + nu) and lambda = E nu/((1 + nu) (1 - 2 nu)); of rubber
         mu V (|F|^2 - 4 J + J^2)/2 beside the same volume row."""
         if law == "neo_hookean":
             at, volume = self._points(RUBBER, damped, WORLD, USUAL[:0])
             volume = volume / 2.0
+        elif stress is not None:
+            at, volume = self._yielding(damped, stress, hardening)
         else:
             at, volume, _ = self._strains(damped)
         E, nu, tau = (self.E, "inverse"), (self.nu, "identity"), (self.tau, "identity")

@@ -1,9 +1,14 @@
-"""What a rod and a cloth say of their yield: a curvature and a share, which belong together."""
+"""What is said of yield: of a rod and a cloth a curvature and a share, which belong together; of a solid a stress and
+its hardening."""
 
 from __future__ import annotations
 
-from ..arrays.checks import is_number
+from collections.abc import Mapping
+from typing import Any
+
+from ..arrays.checks import check_positive, is_number
 from ..errors import SceneError
+from ..mesh import SolidMesh
 
 
 def check_yield(name: str, curvature: float | None, share: float | None, stiffness: str) -> None:
@@ -20,3 +25,35 @@ def check_yield(name: str, curvature: float | None, share: float | None, stiffne
         raise SceneError(f"{name}.yield_share", "and yield_curvature belong together", share, fix)
     if share is not None and not (is_number(share) and 0 < share < 1):
         raise SceneError(f"{name}.yield_share", "must lie between 0 and 1", share, f"give a part of {stiffness}")
+
+
+def check_plastic(
+    name: str, stress: float | None, hardening: float | None, mesh: SolidMesh, numbers: Mapping[str, Any]
+) -> dict[str, float | None]:
+    """The numbers of a solid's yield, those left out too.
+
+    Args:
+        numbers: of its material.
+
+    Raises:
+        SceneError: numbers that are not positive, or a solid that cannot yield.
+    """
+    check_positive(name, {}, {"yield_stress": stress, "hardening": hardening})
+    if stress is None:
+        if hardening is not None:
+            raise SceneError(
+                f"{name}.hardening", "needs a yield stress", hardening, "give yield_stress, or leave it out"
+            )
+        return {"yield_stress": None, "hardening": None}
+    field, leave = f"{name}.yield_stress", "or leave yield_stress out"
+    if "law" not in numbers:
+        beside = "orthotropic" if "orthotropic" in numbers else "clusters"
+        raise SceneError(field, f"is given beside {beside}", stress, f"give E and poisson of one material, {leave}")
+    if mesh.elements.shape[1] != 8:
+        why = "needs bricks: linear tetrahedra lock where a solid flows at constant volume"
+        raise SceneError(field, why, stress, f"use sb.mesh.bricks or hexahedra, {leave}")
+    if numbers["law"] != "strain":
+        raise SceneError(field, 'needs law = "strain"', stress, f'give law = "strain", {leave}')
+    if not numbers["volume_row"]:
+        raise SceneError(field, "needs the volume row that a positive poisson has", stress, f"give one, {leave}")
+    return {"yield_stress": stress, "hardening": hardening}

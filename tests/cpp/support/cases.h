@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <numeric>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -506,6 +507,21 @@ inline Case case_of<BrickStrain>() {
 template <>
 inline Case case_of<TetrahedronStrain>() {
   return solid_case(tetrahedron_sample, tetrahedron_gradients);
+}
+
+// Sliding: the strain is about twice the yield strain.
+template <>
+inline Case case_of<YieldingBrickStrain>() {
+  Case row = case_of<BrickStrain>();
+  const std::size_t count = brick_gradients.size();
+  row.x.insert(row.x.end(), {0.06, -0.04, 0.02, 0.04, -0.08, 0.06});
+  row.p.resize(count);
+  row.p.insert(row.p.end(), {0.3, 0.06});
+  row.relabeling.insert(row.relabeling.end(), {8, 9});
+  row.parameter_sign.assign(row.p.size(), 1);
+  row.parameter_relabeling.resize(row.p.size());
+  std::iota(row.parameter_relabeling.begin() + count, row.parameter_relabeling.end(), count);
+  return row;
 }
 
 // The same material, 1/(mu V) where strains have 1/(2 mu V), without the ratios of stiffness.

@@ -69,7 +69,7 @@ struct SceneBuilder {
   template <class K>
   int add_stencil(int tail, bool damped) {
     const Case sample = case_of<K>();
-    constexpr int points = K::points, directors = K::arity - points - (Yields<K> ? 1 : 0);
+    constexpr int points = K::points, directors = K::arity - points - (Yields<K> ? set_nodes<K> : 0);
     std::vector<int> nodes{tail};
     for (int k = 1; k < K::arity; ++k) {
       double at[3];
