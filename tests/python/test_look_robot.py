@@ -13,7 +13,6 @@ from pytest import approx
 from sheetbend import config
 from sheetbend.arrays.rotations import matrices_of, rotation_matrix
 from sheetbend.look.robot import Poses, riding
-from sheetbend.look.seen import seen
 
 HELD = Path(__file__).resolve().parents[2] / "experiments/held_cloth/data"
 TURN, POSITION, LATE = rotation_matrix("turn", [0.3, -0.5, 1.9]), np.array([0.7, 0.4, -0.9]), 0.31
@@ -45,7 +44,8 @@ def row(of: Poses, places: np.ndarray, noise: float) -> sb.Recording:
 def test_a_row_on_a_tool_shows_clock_frame_and_places(tmp_path: Path, rests: bool) -> None:
     of = poses(tmp_path / "poses.csv", rests)
     places = np.array([[-0.15, 0.02, -0.04], [-0.05, 0.02, -0.03], [0.05, 0.02, -0.04], [0.15, 0.03, -0.04]])
-    found = riding(seen(row(of, places, 1e-4)), [0, 1, 2, 3], of)
+    recording = row(of, places, 1e-4)
+    found = riding(recording.positions, recording.times, of)
     assert found.shift == approx(-LATE, abs=0.011)
     assert found.turn == approx(TURN, abs=0.02) and found.position == approx(POSITION, abs=5e-3)
     assert found.places == approx(places, abs=5e-3)
@@ -74,6 +74,8 @@ def test_the_held_cloth(tmp_path: Path) -> None:
     edge = e.scene.positions[e.scene.cloths["cloth"].particles[e.scene.cloths["cloth"].mesh.sets["top"]]]
     bar = np.array([0.012, 1.292, 0.210])  # as the camera sees it at rest; its ends are 0.2 m to either side
     assert np.linalg.norm(edge.mean(axis=0) - bar) < 0.03
+    top = cloth["mesh"]["height"] - np.mean([cloth["markers"][f"p{k}"][1] for k in range(12, 16)])
+    assert top == approx(0.04, abs=5e-3)  # half of the distance between rows is 53 mm
     assert np.ptp(edge[:, 0]) == approx(0.4, rel=0.07)
 
 

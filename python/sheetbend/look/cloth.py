@@ -10,11 +10,12 @@ import numpy as np
 
 from ..errors import RecordingError
 from . import robot
-from .cloth_held import SAGS, SIDES, Hold, holds, row_of, slung
+from .cloth_held import SAGS, SIDES, Hold, holds, row_of, share, slung
 from .cloth_parts import cloth_parts
 from .cloth_sheet import Sheet
 from .cloth_words import lies_over, seen_of, unknown_of
 from .folded import folded
+from .margin import margin, pitches
 from .seen import Seen
 from .sheet import flattened, placed, spacing
 from .slung import slack
@@ -27,6 +28,7 @@ WHOLE = 0.8  # share of the markers that must hang together as one sheet
 WARP, SHEAR = 500.0, 100.0  # N/m per kg/m^2, to start from
 ASKEW = 0.15  # slope at which a cloth hangs that a wind blows on
 AIR = 0.7  # kg/m^3, of a plate across the wind: half the density of air times a drag coefficient of 1.2
+PLANE = 1.5  # times the noise, by which markers are off a plane at most that a cloth starts in
 SUBSTEP = 1 / 250  # s, at most
 GUESS = 0.5  # standard deviation of what is assumed without a measurement, relative
 SIZE = 0.01  # standard deviation of the flat size that markers on a stretched cloth show, relative
@@ -51,10 +53,10 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
             "configuration by hand",
         )
     sheets, notes, unknown = [], list[str](), list[str]()
-    first = (_looked_at(s, name, own, others, density, {}) for name, own in cloths.items())
+    first = (_looked_at(s, name, own, others, density, {}, None) for name, own in cloths.items())
     bars = _bars([sheet for sheet in first if sheet is not None])
     for name, own in cloths.items():
-        sheet = _looked_at(s, name, own, others, density, bars)
+        sheet = _looked_at(s, name, own, others, density, bars, measured.poses)
         if sheet is None:
             unknown.append(lies_over(names, own, "the middle of their cloth is above two of its sides"))
             continue
@@ -65,8 +67,6 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         own = sorted(sheets[pair[0]].own + sheets[pair[1]].own)
         unknown.append(lies_over(names, own, "they hang from two rows that face each other, on either side of it"))
     sheets = [sheet for k, sheet in enumerate(sheets) if k not in sides]
-    if measured.poses is not None:
-        sheets = [_on_tool(s, sheet, measured.poses) for sheet in sheets]
     for sheet in sheets:
         notes += seen_of(s, sheet, len(cloths) > 1)
     if not sheets:
@@ -75,7 +75,8 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     unknown = [*unknown_of(s, sheets, measured), *unknown]
     for sheet in sheets:
         if sheet.ride is not None:
-            more = robot.notes(sheet.ride, sheet.held[0].beyond)
+            shown = sheet.held[0].margin is not None and sheet.held[0].margin.sd is not None
+            more = robot.notes(sheet.ride, "the held edge" if shown else "the upper row of markers")
             notes, unknown = notes + more[0], unknown + more[1]
     used = {k for sheet in sheets for hold in sheet.held for k in hold.markers}
     unused = [k for k in others if k not in used]
@@ -96,21 +97,31 @@ def _bars(sheets: Sequence[Sheet]) -> dict[int, tuple[float, ...]]:
     return {k: tuple(np.median(rows, axis=0).tolist()) for k, rows in shown.items()}
 
 
-def _on_tool(s: Seen, sheet: Sheet, poses: robot.Poses) -> Sheet:
-    """A cloth whose upper edge a tool holds and its own upper row shows."""
-    hold, *others = sheet.held
-    if others or not hold.own or hold.corners or not hold.moves:
-        names = [s.recording.markers[k] for h in sheet.held for k in h.markers]
+def _on_tool(s: Seen, own: list[int], flat: Array, held: list[Hold], poses: robot.Poses) -> tuple[Hold, robot.Riding]:
+    """How a tool holds the upper edge of a cloth whose own upper row shows it, and what rides on it: the edge itself,
+    where the motion of the rows tells where it is, else the upper row."""
+    hold, *more = held
+    if more or not hold.own or hold.corners or not hold.moves:
+        names = [s.recording.markers[k] for h in held for k in h.markers]
         fix = "leave out the poses, or write the configuration by hand, as in docs/configuration.md"
         raise RecordingError("poses", "go with a cloth whose whole upper edge moves", joined(names), fix)
-    below = 0.5 * spacing(s.apart[np.ix_(sheet.own, sheet.own)])
-    ride = robot.riding(s, list(hold.markers), poses)
-    held = [replace(hold, tool=robot.TOOL, beyond=below)]
-    return replace(sheet, height=sheet.height + below, held=held, ride=ride)
+    x, t = s.recording.positions, s.recording.times
+    row = list(hold.markers)
+    ride = robot.riding(x[:, row], t, poses)
+    told = margin(x[:, own], flat, *SIDES[hold.side], lambda edge: robot.off_near(edge, t, poses, ride.shift))
+    if told.edge is not None:
+        ride = robot.riding(told.edge, t, poses)
+    return replace(hold, tool=robot.TOOL, beyond=told.length, margin=told), ride
 
 
 def _looked_at(
-    s: Seen, name: str, own: list[int], others: Sequence[int], density: float, bars: Mapping[int, tuple[float, ...]]
+    s: Seen,
+    name: str,
+    own: list[int],
+    others: Sequence[int],
+    density: float,
+    bars: Mapping[int, tuple[float, ...]],
+    poses: robot.Poses | None,
 ) -> Sheet | None:
     """A cloth; None where something lies under it. Bars point where its rows beside them do, if not given."""
     r = s.recording
@@ -131,16 +142,40 @@ def _looked_at(
     if found is not None:
         flat = flat * [found.length / np.ptp(flat[:, 0]), 1.0]
     held = holds(s, own, flat, others, ("left", "right") if is_slung else ("top",), bars)
+    ride = None
+    if poses is not None:
+        hold, ride = _on_tool(s, own, flat, held, poses)
+        held = [hold]
     beyond = {hold.side: hold.beyond for hold in held}
     if found is not None:  # the cloth is stretched there too
         beyond |= {side: beyond[side] * found.length / found.first for side in ("left", "right") if side in beyond}
+    free = share(held) * pitches(flat)
     low, high = (
-        np.array([beyond.get(side, 0.5 * apart) for side in sides]) for sides in (("left", "bottom"), ("right", "top"))
+        np.array([beyond.get(side, free[SIDES[side][0]]) for side in sides])
+        for sides in (("left", "bottom"), ("right", "top"))
     )
     width, height = (np.ptp(flat, axis=0) + low + high).tolist()
     at_rest = not s.static and not any(hold.moves for hold in held) and not is_slung
     wind = _wind(s, own, [own[k] for k in row_of(flat, "top", apart)], up, density) if at_rest else None
-    return Sheet(name, own, flat + low, width, height, low, place - axes.T @ low, axes, held, is_slung, found, wind)
+    origin = place - axes.T @ low
+    for told in (hold.margin for hold in held if ride is None and not is_slung):
+        if told is not None and told.edge is not None and told.along is not None:  # all frames show an edge at rest
+            origin = np.nanmean(told.edge, axis=(0, 1)) - axes.T @ [told.along.mean() + low[0], height]
+    rests = not any(hold.moves for hold in held) and not is_slung  # a grip starts where its markers are
+    starts_flat = rests and not s.static and _lies_flat(s, own)
+    return Sheet(
+        name, own, flat + low, width, height, low, origin, axes, held, is_slung, starts_flat, found, wind, ride
+    )
+
+
+def _lies_flat(s: Seen, own: list[int]) -> bool:
+    """Whether markers lie in a plane in the first frame, but for their noise."""
+    x = s.recording.positions[0, own]
+    x = x[np.isfinite(x[:, 0])]
+    if len(x) < 4:
+        return False
+    off = np.linalg.svd(x - x.mean(axis=0), compute_uv=False)[2] / np.sqrt(len(x) - 3)
+    return bool(off < max(PLANE * s.noise, 1e-3 * np.linalg.norm(np.ptp(x, axis=0))))
 
 
 def _wind(s: Seen, own: list[int], row: list[int], up: Array, density: float) -> Array | None:
@@ -195,11 +230,14 @@ def _cloth(s: Seen, sheet: Sheet, density: float) -> list[str]:
     origin, axes, ahead = sheet.origin, list(sheet.axes), list[str]()
     if sheet.ride is not None:
         (hold,), numbers = sheet.held, {k: i for i, k in enumerate(sheet.own)}
-        along = sheet.flat[[numbers[k] for k in hold.markers], 0]
-        origin, *axes, position = robot.placed(sheet.ride, s, along, hold.beyond, sheet.height)
+        if hold.margin is not None and hold.margin.along is not None:
+            along, below = hold.margin.along + sheet.low[0], 0.0
+        else:
+            along, below = sheet.flat[[numbers[k] for k in hold.markers], 0], hold.beyond
+        origin, *axes, position = robot.placed(sheet.ride, s, along, below, hold.beyond, sheet.height)
         ahead, cloth["on_tool"] = robot.lines(sheet.ride, position), robot.TOOL
     cloth |= {"origin": origin.tolist(), "x_axis": axes[0].tolist(), "y_axis": axes[1].tolist()}
-    through = sheet.ride is None and (s.recording.mask[0, sheet.own].all() or s.static)
+    through = sheet.ride is None and not sheet.starts_flat and (s.recording.mask[0, sheet.own].all() or s.static)
     cloth["shape"] = "recording" if through else None
     pinned, sets, grips = (
         sum(found, list[Any]()) for found in zip(*(h.tables(names, s) for h in sheet.held), strict=True)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays.timeseries import default_max_gap
+from .margin import HALF, Margin, margin
 from .seen import Seen
 from .sheet import laid, spacing
 
@@ -36,6 +37,7 @@ class Hold:
         along: m, where they are along the side, in the coordinates of the markers' places; of a holder.
         bar: (3,) direction of the side, where one marker of a holder alone shows where it is.
         tool: name of the tool that moves it, in place of the markers.
+        margin: how `beyond` is told, of an edge beyond the cloth's own row that rests or that a tool moves.
     """
 
     side: str
@@ -47,6 +49,7 @@ class Hold:
     along: tuple[float, ...] = ()
     bar: tuple[float, ...] | None = None
     tool: str | None = None
+    margin: Margin | None = None
 
     def tables(self, names: Sequence[str], s: Seen) -> tuple[list[Any], list[Any], list[Any]]:
         """Sets that are pinned, sets, and grips of a cloth."""
@@ -61,6 +64,12 @@ class Hold:
         if not self.moves:
             return list(by_set), sets, []
         return [], sets, [{"set": name, "markers": markers} for name, markers in by_set.items()]
+
+
+def share(held: Sequence[Hold]) -> float:
+    """By how much a cloth goes on beyond its outer markers where nothing holds it, over the distance between markers:
+    as beyond the row next to what holds it, for want of better knowledge."""
+    return next((hold.margin.share for hold in held if hold.margin is not None), HALF)
 
 
 def row_of(flat: Array, side: str, apart: float) -> list[int]:
@@ -131,8 +140,10 @@ def holds(
         row = [numbers[k] for k in row_of(flat, side, apart)]
         moves = not s.static and motion(x[:, row]) >= QUIET * moved
         corners = _sags(x, row)
-        beyond = 0.0 if moves or corners else 0.5 * apart
-        found.append(Hold(side, (row[0], row[-1]) if corners else tuple(row), corners, moves, beyond, True))
+        told = None if moves or corners else margin(x[:, numbers], flat, *SIDES[side])
+        markers = (row[0], row[-1]) if corners else tuple(row)
+        beyond = 0.0 if told is None else told.length
+        found.append(Hold(side, markers, corners, moves, beyond, True, margin=told))
     return found
 
 

@@ -26,9 +26,10 @@ class Sheet:
         origin, axes: (3,) m and (2, 3), where the fabric lies best.
         held: what holds it.
         slung: whether it lies between two sides that are held, its x axis from one to the other.
+        starts_flat: whether it lies flat in the first frame: a shape through its noisy markers would have wrinkles.
         slack: what it is without tension, where its motion shows it.
         wind: (3,) m/s, a guess, where the cloth hangs askew and hardly moves; None elsewhere.
-        ride: how its upper row rides on a tool, where poses of one are given.
+        ride: how its upper edge rides on a tool, or its upper row where nothing tells where that edge is.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Sheet:
     axes: Array
     held: list[Hold]
     slung: bool
+    starts_flat: bool
     slack: Slack | None
     wind: Array | None
     ride: Riding | None = None

@@ -95,14 +95,12 @@ class Riding:
     rests: bool
 
 
-def riding(s: Seen, row: list[int], poses: Poses) -> Riding:
-    """How markers ride on a tool.
+def riding(x: Array, t: Array, poses: Poses) -> Riding:
+    """How points (frames, k, 3) m at times t, s, ride on a tool.
 
     Raises:
         RecordingError: they do not move as the poses do.
     """
-    r = s.recording
-    x, t = r.positions[:, row], r.times
 
     def tried_at(shifts: Array) -> list[tuple[float, float]]:
         inside = [((t + d >= poses.times[0]) & (t + d <= poses.times[-1])).mean() >= SHARE for d in shifts]
@@ -124,6 +122,12 @@ def riding(s: Seen, row: list[int], poses: Poses) -> Riding:
     near, _ = poses.at(np.array([start - 0.05, start, start + 0.05]))
     rests = bool(np.linalg.norm(np.diff(near, axis=0), axis=1).max() <= MOVES * 0.05)
     return Riding(poses, shift, turn, position, places, off, start, rests)
+
+
+def off_near(x: Array, t: Array, poses: Poses, shift: float) -> float:
+    """m, root mean square distance of points (frames, k, 3) from where they ride best, with the clock near a shift."""
+    near = shift + np.arange(-COARSE, COARSE + FINE / 2, FINE)
+    return min(_off(x, *_ride(x, t, poses, float(d)), poses, t, float(d)) for d in near)
 
 
 def _within(x: Array, t: Array, poses: Poses, shift: float) -> tuple[Array, Array, Array]:
@@ -153,7 +157,8 @@ def _ride(x: Array, t: Array, poses: Poses, shift: float) -> tuple[Array, Array,
         columns[:, :, 3:6] = np.eye(3)
         for k in range(len(places)):
             columns[markers == k, :, 6 + 3 * k : 9 + 3 * k] = turn @ q[frames[markers == k]]
-        step = np.linalg.lstsq(columns.reshape(-1, columns.shape[2]), residual.ravel(), rcond=RANK)[0]
+        rows = columns.reshape(-1, columns.shape[2])
+        step = np.linalg.pinv(rows.T @ rows, RANK**2, hermitian=True) @ (rows.T @ residual.ravel())
         turn = rotation_matrix("turn", step[:3]) @ turn
         position, places = position + step[3:6], places + step[6:].reshape(-1, 3)
     return turn, position, places
@@ -166,13 +171,16 @@ def _off(x: Array, turn: Array, position: Array, places: Array, poses: Poses, t:
     return float(np.sqrt(np.nanmean(((x - on) ** 2).sum(axis=2))))
 
 
-def placed(ride: Riding, s: Seen, along: Array, below: float, height: float) -> tuple[Array, Array, Array, Array]:
+def placed(
+    ride: Riding, s: Seen, along: Array, below: float, near: float, height: float
+) -> tuple[Array, Array, Array, Array]:
     """Origin and the x and y axes of a cloth in the tool's axes as it hangs at the start, and the origin of the poses'
     frame in the recording's.
 
     Args:
-        along: (k,) m, where the row's markers are along the cloth's upper edge.
-        below: m, from the edge to the row.
+        along: (k,) m, where what rides is along the cloth's upper edge.
+        below: m, from the edge to what rides.
+        near: m, how near the tool's origin an edge is that is taken to run through it.
         height: m, of the cloth.
     """
     up = -s.gravity / np.linalg.norm(s.gravity)
@@ -185,7 +193,7 @@ def placed(ride: Riding, s: Seen, along: Array, below: float, height: float) -> 
     edge = (ride.places - along[:, None] * x).mean(axis=0)
     aside = edge - (edge @ x) * x
     position = ride.position + below * up
-    if np.linalg.norm(aside) <= below:  # what the row's own swing may seem; a tool's origin is where it grips
+    if np.linalg.norm(aside) <= near:  # what the row's own swing may seem; a tool's origin is where it grips
         edge, position = edge - aside, position + ride.turn @ at_start @ aside
     return edge - height * y, x, y, position
 
@@ -205,21 +213,18 @@ def about(ride: Riding) -> Array:
     return np.asarray(ride.turn @ ride.poses.positions.mean(axis=0) + ride.position)
 
 
-def notes(ride: Riding, below: float) -> tuple[list[str], list[str]]:
-    """What is seen, and what is not known; `below` is that of `placed`."""
+def notes(ride: Riding, what: str) -> tuple[list[str], list[str]]:
+    """What is seen, and what is not known, of what rides on the tool."""
     seen = [
-        f"the upper row of markers moves as the poses of {ride.poses.file} do, {1e3 * ride.off:.2g} mm off on average, "
+        f"{what} moves as the poses of {ride.poses.file} do, {1e3 * ride.off:.2g} mm off on average, "
         f"if {ride.shift:.2f} s are added to the recording's times"
     ]
     unknown = [
-        "where the tool holds the cloth, and the transform between the two frames: both are read off the upper row's "
-        "motion, and an edge that seems to be near the tool's origin is taken to run through it. "
+        f"where the tool holds the cloth, and the transform between the two frames: both are read off how {what} "
+        "moves, and an edge that seems to be near the tool's origin is taken to run through it. "
         f"The transform is fitted, with a prior of {1e3 * SHIFT_SD:.0f} mm and {TURN_SD} rad, and so is the "
         "clock. Give a calibration (`position`, `quaternion`) and the cloth's place on the tool (`origin`) where you "
         "have them",
-        f"how far the upper row of markers is below the edge that the tool holds: {1e3 * below:.0f} mm, half of the "
-        "distance between rows, is taken. Measure it, and correct `height`, `origin` and the markers' places: in one "
-        "example the prediction was off by 7 mm with the true 40 mm, and by 13 mm with 51 mm",
         "whether what carries the cloth bends: it is taken as stiff. Add `flex` to [[scene.tool]] if it is not",
     ]
     if not ride.rests:
