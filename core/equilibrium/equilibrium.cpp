@@ -11,7 +11,7 @@ namespace sheetbend {
 namespace {
 
 constexpr int max_corrections = 5;        // simplified Newton steps per factorization
-constexpr int max_departures = 5;         // from saddles
+constexpr int max_departures = 10;        // from saddles
 constexpr double almost_no_eta = 1e-100;  // to which only rigid rows count, see redundant_rows.h
 
 std::string not_converged(const Equilibrium& e, double tolerance, bool touching) {
@@ -33,7 +33,8 @@ std::string not_converged(const Equilibrium& e, double tolerance, bool touching)
 // that alpha says are rigid lose this share of their violation.
 bool EquilibriumSolver::step(State& s, double mu, const double* alpha, double share) {
   if (!kkt_.factorize(mu, alpha)) return false;
-  if (s.options.stable && s.residual > near_rest && kkt_.negative_modes() > 0) return false;
+  if (mu == 0.0 && kkt_.negative_modes() == 0) s.falling = false;
+  if (s.options.stable && (s.residual > near_rest || s.falling) && kkt_.negative_modes() > 0) return false;
   std::vector<double> x = s.x, lambda = s.lambda, dx, dl;
   double first = 0.0, before = 0.0;
   std::vector<double> left(lambda.size(), 0.0);
@@ -100,21 +101,92 @@ void EquilibriumSolver::assemble(State& s) {
   kkt_.take_contacts(s.modes.blocks(s.contacts, s.x.data()));
 }
 
-// Moves a little along a direction of negative curvature, found by inverse iteration on the smallest K + mu that is positive definite.
-void EquilibriumSolver::leave_saddle(State& s) {
+// The lowest mode of K on the tangent space of the rigid rows, by inverse iteration on a K + mu that is positive definite, with mu ever closer to minus
+// the Rayleigh quotient. Empty where no direction of negative curvature is found.
+EquilibriumSolver::Mode EquilibriumSolver::lowest_mode(const State& s) {
   const double* alpha = s.compliance.data();
-  double mu = 1e-9 * kkt_.largest_diagonal();
-  for (int k = 0; k < 100 && (!kkt_.factorize(mu, alpha) || kkt_.negative_modes() > 0); ++k) mu *= 2.0;
-  std::vector<double> v(scene_.dofs()), rows(scene_.multipliers());
+  const auto definite = [&](double mu) { return kkt_.factorize(mu, alpha) && kkt_.negative_modes() == 0; };
+  double mu = s.force_stiffness();
+  for (int k = 0; !definite(mu); ++k, mu *= 4.0)
+    if (k == 50) return {};
+  Mode mode;
+  std::vector<double> v(scene_.dofs()), w, rows(scene_.multipliers());
   for (int i = 0; i < scene_.dofs(); ++i) v[i] = std::sin(1.0 + 1.7 * i);
-  for (int k = 0; k < 8; ++k) {
+  const auto product = [&](const std::vector<double>& a, const std::vector<double>& b) {
+    double sum = 0.0;
+    for (int i = 0; i < scene_.dofs(); ++i) sum += kkt_.metric(i) * a[i] * b[i];
+    return sum;
+  };
+  for (int k = 0; k < 60; ++k) {
+    w = v;
+    for (int i = 0; i < scene_.dofs(); ++i) w[i] *= kkt_.metric(i);
     std::fill(rows.begin(), rows.end(), 0.0);
-    kkt_.solve(v.data(), rows.data(), 1e-3);
-    const double scale = 1.0 / largest(v);
-    for (double& a : v) a *= scale;
+    if (!kkt_.solve(w.data(), rows.data(), 1e-6) || !finite(w)) return {};
+    const double before = mode.curvature, length2 = product(w, w);
+    mode.curvature = -product(w, v) / length2 - mu;  // A has -K
+    for (int i = 0; i < scene_.dofs(); ++i) v[i] = w[i] / std::sqrt(length2);
+    if (mode.curvature < 0.0 && std::abs(mode.curvature - before) < 0.01 * -mode.curvature) {
+      mode.direction = std::move(v);
+      return mode;
+    }
+    const double nearer = mode.curvature < 0.0 ? std::min(mu, -1.2 * mode.curvature) : 0.2 * mu;
+    if (nearer < mu && definite(nearer))
+      mu = nearer;
+    else
+      definite(mu);
   }
-  for (int i = 0; i < scene_.dofs(); ++i) s.x[i] += 0.1 * s.edge * v[i];
+  return {};
+}
+
+// Steps off a saddle to a shape of less energy: a proximal step from a little to each side along its lowest mode, so little that the energy falls on both.
+// Of these that is taken where it falls less, since a stable shape that is near lies there. At a surface it may fall on one side only. From then on no step
+// goes toward a saddle until K has been positive definite. False, with nothing changed, where the energy falls by no more than rounding.
+bool EquilibriumSolver::leave_saddle(State& s, double& mu) {
+  const Mode mode = lowest_mode(s);
+  if (mode.direction.empty()) return false;
+  const std::vector<double> x = s.x, lambda = s.lambda;
+  const double from = s.energy(), rounding = 1e-14 * (std::abs(from) + s.total * s.size);
+  double longest = 0.0;
+  for (int i = 0; i < scene_.dofs(); ++i)
+    longest = std::max(longest, std::sqrt(kkt_.metric(i)) * std::abs(mode.direction[i]));
+  mu = -2.0 * mode.curvature;
+  s.exact = s.falling = true;
+  s.softened = s.compliance;
+  struct Side {
+    std::vector<double> x, lambda;
+    double fall = 0.0;
+  };
+  const auto side = [&](double way) {
+    s.x = x;
+    s.lambda = lambda;
+    for (int i = 0; i < scene_.dofs(); ++i) s.x[i] += way / longest * mode.direction[i];
+    retract_directors(scene_, s.x.data());
+    s.measure();
+    assemble(s);
+    Side reached;
+    for (int k = 0; k < 6; ++k)
+      if (step(s, std::pow(4.0, k) * mu, s.compliance.data())) {
+        s.measure();
+        reached = {s.x, s.lambda, from - s.energy()};
+        break;
+      }
+    return reached;
+  };
+  Side to{x, lambda};
+  bool both = false;
+  for (double way = 0.1 * s.edge; !both && way > 1e-7 * s.edge; way *= 0.25) {
+    Side left = side(way), right = side(-way);
+    both = std::min(left.fall, right.fall) > rounding;
+    const bool to_left = both ? left.fall <= 1.001 * right.fall : left.fall > right.fall;
+    Side& one = to_left ? left : right;
+    if (both || (to.fall == 0.0 && one.fall > rounding)) to = std::move(one);
+  }
+  s.falling = to.fall > 0.0;
+  s.x = std::move(to.x);
+  s.lambda = std::move(to.lambda);
   s.last_step = std::numeric_limits<double>::infinity();
+  s.measure();
+  return s.falling;
 }
 
 Equilibrium EquilibriumSolver::solve(const double* inputs, const double* start_x, const double* start_lambda,
@@ -138,14 +210,12 @@ Equilibrium EquilibriumSolver::solve(const double* inputs, const double* start_x
     }
     assemble(s);
     ++result.iterations;
-    if (s.converged() || s.find_unstressed()) {
+    if (!s.falling && (s.converged() || s.find_unstressed())) {
       result.unstable_modes = kkt_.factorize(0.0, s.compliance.data()) ? kkt_.negative_modes() : -1;
       result.converged = true;
-      if (!options.stable || result.unstable_modes <= 0 || departures == max_departures) break;
-      leave_saddle(s);
+      if (!options.stable || result.unstable_modes <= 0 || departures == max_departures || !leave_saddle(s, mu)) break;
       ++departures;
       result.converged = newton = false;
-      s.measure();
       continue;
     }
     bool accepted = newton && step(s, 0.0, s.compliance.data());

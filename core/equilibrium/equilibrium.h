@@ -5,8 +5,9 @@
 // method, which descends the energy (pseudo-transient continuation: Kelley & Keyes 1998). A step is trusted where the Hessian
 // K is positive definite and every further, simplified Newton step with the same factors is at most half of the one before
 // (the natural monotonicity test: Deuflhard, Newton Methods for Nonlinear Problems); otherwise mu grows. Constraints that the
-// start violates by far are softened at first. Saddles are left along a direction of negative curvature. So a solution is stable
-// wherever the start allows; soft wires have several, and which one is found depends on the start (see branches.h).
+// start violates by far are softened at first, unless it is the solution of other inputs. Saddles are left along their lowest mode, toward a stable shape
+// that is near. So a solution is stable wherever energy tells it from rounding; soft wires have several, and which one is found depends on the start (see
+// branches.h).
 //
 // Contacts push and pull while Newton's method takes a step; between steps the law decides which of them are apart, stick or slide (an active set).
 //
@@ -67,7 +68,12 @@ class EquilibriumSolver {
   bool step(State& s, double mu, const double* alpha, double share = 1.0);
   void assemble(State& s);
   void estimate_multipliers(State& s);
-  void leave_saddle(State& s);
+  struct Mode {
+    double curvature = 0.0;         // N/m
+    std::vector<double> direction;  // (dofs)
+  };
+  Mode lowest_mode(const State& s);
+  bool leave_saddle(State& s, double& mu);
 
   void find_redundant_rows(State& s);
 

@@ -78,6 +78,7 @@ EquilibriumState::EquilibriumState(const Scene& scene_, const double* inputs, co
       compliance(compliances(scene_, in)),
       softened(compliance),
       soft(scene_.groups.size() + scene_.volumes.size(), std::numeric_limits<double>::infinity()),
+      exact(start_lambda != nullptr),
       contacts(scene_, in, o.t0, o.held ? o.held : in.of(Quantity::position)) {
   expect_energy(scene, in, o.t0);
   expect_no_unilateral(scene);
@@ -127,6 +128,7 @@ double EquilibriumState::first_pseudo_stiffness(Kkt& kkt) const {
 }
 
 void EquilibriumState::soften() {
+  if (exact) return;
   const double budget = energy_share * total * size;
   AnyConstraint<double> own;
   for (std::size_t g = 0; g < scene.groups.size(); ++g) {
@@ -238,12 +240,14 @@ double EquilibriumState::energy() const {
   for (int i = 0; i < scene.dofs(); ++i) sum -= f[i] * x[i];
   for_each_constraint(scene, [&](const Group& group, int item) {
     for (int j = 0; j < group.rows; ++j) {
-      const double l = lambda[group.first_row + item * group.rows + j];
-      sum += 0.5 * compliance[group.first + item] * l * l;
+      const int row = group.first_row + item * group.rows + j;
+      const double l = lambda[row];
+      sum += 0.5 * compliance[group.first + item] * l * l - l * r_l[row];
     }
   });
   for (std::size_t v = 0; v < scene.volumes.size(); ++v)
-    sum += 0.5 * compliance[scene.constraints + v] * lambda[scene.rows + v] * lambda[scene.rows + v];
+    sum += lambda[scene.rows + v] *
+           (0.5 * compliance[scene.constraints + v] * lambda[scene.rows + v] - r_l[scene.rows + v]);
   return sum;
 }
 

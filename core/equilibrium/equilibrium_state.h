@@ -23,6 +23,7 @@ struct EquilibriumState {
   double size, edge, weight, total = 0.0;  // of the scene, of an edge  [m]; largest and summed external force  [N]
   std::vector<double> inflation;  // per volume, what changing the start's to its own takes by the first estimate  [J]
   double residual = 0.0, last_step = std::numeric_limits<double>::infinity();
+  bool exact, falling = false;  // nothing is softened any more; a saddle was left, and the energy falls away from it
   std::vector<RedundantRow> left_out;
   RestingContacts<double> contacts;
   RestingModes modes;

@@ -162,6 +162,86 @@ TEST(Equilibrium, ColumnBucklesAtEulersLoad) {
   }
 }
 
+// The same column from exactly straight, buckled until its free end leans by 60 degrees: the elastica with k = sin(30 degrees), whose load is (2 K / pi)^2 of
+// Euler's, whose end is 2 k / K aside and 2 E / K - 1 above (in lengths).
+TEST(Equilibrium, ABuckledColumnLeavesItsStraightSaddle) {
+  const double k = 0.5, K = std::comp_ellint_1(k), E = std::comp_ellint_2(k);
+  Rope column =
+      make_rope({.links = 40, .density = 0.0, .EA = 1e6, .EI = 0.01, .clamp_first = true, .hold_last = false});
+  for (int n = -1; n <= 40; ++n) column.set_position(n, 0.0, 0.0, n / 40.0);
+  column.of(Quantity::force)[5] = -0.01 * K * K;
+  const Equilibrium straight = column.solve({.stable = false}), bent = column.solve(), again = column.solve();
+  ASSERT_TRUE(straight.converged && bent.converged) << bent.message;
+  EXPECT_EQ(straight.unstable_modes, 2);
+  EXPECT_LT(bent.energy, straight.energy - 1e-4);
+  const Vec3<double> end = column.point(bent, 40);
+  EXPECT_NEAR(std::hypot(end.x, end.y), 2.0 * k / K, 5e-3);
+  EXPECT_NEAR(end.z, 2.0 * E / K - 1.0, 5e-3);
+  EXPECT_EQ(bent.x, again.x);
+}
+
+// Clamped at both ends, nearer to each other than it is long, and standing up. It resists sideways only by its weight, so it rolls down about its ends
+// until it hangs.
+TEST(Equilibrium, AStandingArchRollsDownUntilItHangs) {
+  const auto bow = [](double up) {
+    Rope rope = make_rope({.links = 40, .EI = 0.02, .clamp_first = true, .clamp_last = true});
+    for (int k = -1; k <= 41; ++k) {
+      const double s = k / 40.0, held = std::clamp(s, 0.0, 1.0);
+      rope.set_position(k, 0.9 * held + (s - held), 0.0, 0.1 * up * (1.0 - std::cos(2.0 * std::numbers::pi * held)));
+    }
+    return rope;
+  };
+  const Equilibrium hanging = bow(-1.0).solve(), standing = bow(1.0).solve({.stable = false}),
+                    fallen = bow(1.0).solve();
+  ASSERT_TRUE(hanging.converged && standing.converged && fallen.converged) << fallen.message;
+  EXPECT_EQ(hanging.unstable_modes, 0);
+  EXPECT_EQ(standing.unstable_modes, 1);
+  EXPECT_EQ(fallen.unstable_modes, 0);
+  EXPECT_GT(standing.energy, hanging.energy + 0.05);
+  EXPECT_NEAR(fallen.energy, hanging.energy, 1e-9);
+  EXPECT_LE(fallen.iterations, 100);
+}
+
+// Two springs in compression (von Mises' truss) under a weight just below that at which they snap through. The stable shape is a little above the saddle,
+// another one far below. From the saddle the way leads to the near one.
+TEST(Equilibrium, FromASaddleTheNearStableShapeIsFound) {
+  SceneSpec spec;
+  spec.particles = 4;
+  spec.pinned = {0, 1, 3};
+  spec.groups = {{"bars", "distance", false, {0, 2, 1, 2, 3, 2}}};  // the last one holds it sideways
+  const Scene scene = build_scene(spec);
+  std::vector<double> inputs(scene.layout.total(), 0.0);
+  const Inputs<double> in{scene.layout, inputs.data()};
+  const double k = 100.0, rest = std::hypot(1.0, 0.2);
+  // Where the force of the bars, 2 k z (rest/length - 1), is largest: length^3 = rest.
+  const double length = std::cbrt(rest), top = std::sqrt(length * length - 1.0),
+               most = 2.0 * k * top * (rest / length - 1.0);
+  Vec3<double>(-1.0, 0.0, 0.0).store(in.of(Quantity::position));
+  Vec3<double>(1.0, 0.0, 0.0).store(in.of(Quantity::position) + 3);
+  Vec3<double>(0.0, 1e3, 0.0).store(in.of(Quantity::position) + 9);
+  in.of(Quantity::rest)[0] = in.of(Quantity::rest)[1] = rest;
+  in.of(Quantity::rest)[2] = 1e3;
+  std::fill_n(in.of(Quantity::compliance), 3, 1.0 / k);
+  in.of(Quantity::gravity)[2] = -g;
+  for (const double share : {0.9, 0.99, 0.9999}) {
+    in.of(Quantity::mass)[2] = share * most / g;
+    const auto from = [&](double z, bool stable) {
+      std::vector<double> x(in.of(Quantity::position), in.of(Quantity::position) + scene.dofs());
+      x[8] = z;
+      return EquilibriumSolver(scene).solve(inputs.data(), x.data(), nullptr, {.stable = stable});
+    };
+    const double aside = std::sqrt(1.0 - share) * top;
+    const Equilibrium above = from(top + aside, true), saddle = from(top - aside, false);
+    ASSERT_TRUE(above.converged && saddle.converged);
+    ASSERT_EQ(above.unstable_modes, 0) << share;
+    ASSERT_EQ(saddle.unstable_modes, 1) << share;
+    const Equilibrium left = from(saddle.x[8], true);
+    ASSERT_TRUE(left.converged) << left.message;
+    EXPECT_EQ(left.unstable_modes, 0);
+    EXPECT_NEAR(left.x[8], above.x[8], 1e-8) << share;
+  }
+}
+
 // From a rough circle hanging down, and from one standing up and slightly bent aside, soft and stiff wires fall into one loop.
 TEST(Equilibrium, SoftWireFallsIntoItsLoopFromFarAway) {
   for (const double EI : {1e-5, 6e-5, 1e-3})

@@ -1,9 +1,9 @@
-"""Whether a shape at rest would stay as it was fitted: at a saddle of the energy nothing rests.
+"""Whether a search ended where a shape at rest is about to lose its stability.
 
-The solver leaves saddles, but close to the edge of stability it comes back to them. A fit follows a shape across this
-edge, and a little farther every step leads to another shape, far from the recording. So the search ends there although
-the cost has no minimum, and a linear interval at that point tells nothing. Wires at rest with a free shape without load
-do this: the larger their stiffness, the larger the moment that their set has to take back.
+Wires at rest with a free shape without load have an edge of stability: the larger their stiffness, the larger the
+moment that their set has to take back, until they snap to another shape, far from the recording. A search cannot cross
+this edge, because the cost behind it is far higher. So it ends there although the cost still falls toward it, and a
+linear interval at that point tells nothing.
 """
 
 from __future__ import annotations
@@ -12,56 +12,46 @@ import numpy as np
 
 from ..arrays.timeseries import Array
 from ..errors import SheetbendError
-from ..experiment.experiment import Experiment
+from ..minimum.linear_step import gauss_newton
 from ..minimum.problem import FitProblem
-from ..motion.equilibrium import Equilibrium, equilibrium
-from ..objects.markers import Place
+from ..quantities.wording import short
 
+AHEAD = 0.01  # of the step that the search would take next: so far ahead the edge is looked for
+LEAP = 10.0  # times what that part of the step would move a shape to first order
 SAME = 1e-6  # m: shapes nearer than this everywhere are one, as those of `equilibria`
 
 
 def unstable_rests(problem: FitProblem, u: Array) -> dict[str, str]:
-    """By free parameter, that a shape at rest which depends on it would not stay there. Takes two equilibria for each
-    static experiment.
+    """By free parameter, that a shape at rest which depends on it would snap to another one a little farther. Takes one
+    Jacobian, and two equilibria for each static experiment.
 
     Args:
         u: (free,) the minimum.
     """
+    rests = [i for i, e in enumerate(problem.experiments) if e.static and not e.is_cloud]
+    if not rests:
+        return {}
+    ok, r, J = problem.evaluate(u)
+    if not ok or not np.isfinite(J).all():
+        return {}
     found: dict[str, str] = {}
-    for i, e in enumerate(problem.experiments):
-        if not e.static or e.is_cloud:
-            continue
+    first, ahead = problem.core.first_rows, AHEAD * (gauss_newton(problem.parameters, u, J, r) - u)
+    for i in rests:
+        e = problem.experiments[i]
+        expected = e.sigma * float(np.abs(J[first[i] : first[i + 1]] @ ahead).max())
         try:
-            fitted = problem.simulate_one(i, u)
-            nearest = equilibrium(e.scene, values=problem.values_of(e, u), stable=False)
+            leap = float(np.nanmax(np.abs(problem.simulate_one(i, u + ahead) - problem.simulate_one(i, u))))
         except SheetbendError:
-            continue  # no shape to judge
-        if nearest.unstable_modes > 0 and _same(e, nearest, fitted):
-            found |= dict.fromkeys(problem.acting_on(e), _words(e.name, nearest.unstable_modes))
+            continue  # no other shape to name
+        if leap > LEAP * expected + SAME:
+            found |= dict.fromkeys(problem.acting_on(e), _snaps(e.name, leap))
     return found
 
 
-def _same(e: Experiment, rest: Equilibrium, fitted: Array) -> bool:
-    """Whether the compared markers (1, markers, 3) m of a fit lie on a shape, those with offsets left out."""
-    places = [
-        (k, place) for k, (i, place) in enumerate(zip(e.placed, e.compared_places, strict=True)) if _bare(e, i, place)
-    ]
-    if not places:
-        return False
-    shape = np.array([p.weights @ rest.nodes[e.scene.places_of(p.particles)] for _, p in places])
-    gaps = np.abs(shape - fitted[0, [k for k, _ in places]])
-    return bool(gaps.max() < SAME)
-
-
-def _bare(e: Experiment, i: int, place: Place) -> bool:
-    """Whether a marker is where weights of nodes put it."""
-    return place.offset is None and place.body is None and e.recording.markers[i] not in e.offsets
-
-
-def _words(name: str, count: int) -> str:
-    ways = "one direction" if count == 1 else f"{count} directions"
+def _snaps(name: str, leap: float) -> str:
     return (
-        f"the fitted shape of {name} is unstable: its energy falls in {ways}, so nothing would rest there, and the "
-        "search ended at an edge of the possible values. Look at how it is held and at its shape without load: a "
-        "narrower prior of it, or fewer of its modes (set_modes)"
+        f"the search ended at an edge of stability: a little farther {name} would snap to another shape, "
+        f"{short(1e3 * leap)} mm off, although the cost falls toward it. Look at how it is held and at its shape "
+        "without load: a narrower prior of it, or fewer of its modes (set_modes). The set of a rope keeps its "
+        "direction in space, so it says little of how stable a shape is sideways; that of a rod turns with it"
     )
