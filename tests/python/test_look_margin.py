@@ -104,10 +104,11 @@ def test_a_margin_that_nothing_shows_is_to_be_measured_with_a_ruler(tmp_path: Pa
 @pytest.mark.slow
 def test_a_draft_of_a_cloth_in_wind_predicts_to_its_noise(tmp_path: Path) -> None:
     """It was 2.59 mm, more than if nothing moved (2.43 mm), with a shear of 386 N/m where 23 is true; the noise is
-    1.72 mm, which the shipped configuration comes to. What the wrong layout draws off is not called identified."""
-    fit = fitted(tmp_path, "cloth_in_wind/data/cloth_in_wind.npz", "--density", "0.15")
+    1.72 mm, which the shipped configuration comes to. What the stretched layout draws off is called doubtful. Bending
+    is left out: it is that of cells of 70 mm, and the report says that the mesh is not counted."""
+    fit = fitted(tmp_path, "cloth_in_wind/data/cloth_in_wind.npz", "--density", "0.15", codes=(0, 4))
     assert fit.recordings[0].held_out < 1.2 * 1.72e-3
-    true = {"warp": 60.0, "shear": 23.08, "bending": 3e-5, "air_normal": 0.7, "air_tangential": 0.05}
+    true = {"warp": 60.0, "shear": 23.08, "air_normal": 0.7, "air_tangential": 0.05}
     for name, value in {f"cloth_{name}": value for name, value in true.items()}.items():
         assert fit[name].verdict == "doubtful" or fit[name].lower < value < fit[name].upper, name
     assert fit["wind_y"].value == approx(1.6, rel=0.02) and fit["cloth_air_normal"].value == approx(0.7, rel=0.03)
@@ -118,7 +119,7 @@ def test_a_draft_of_a_cloth_in_wind_predicts_to_its_noise(tmp_path: Path) -> Non
 def test_a_draft_of_a_cloth_on_a_robot_predicts_as_the_shipped_configuration_does(tmp_path: Path) -> None:
     """It was 11.4 mm, with the held edge 51 mm above the upper row (true: 40 mm). The shipped configuration, which is
     given the calibration and the size of the cloth, has 7.3 mm."""
-    fit = fitted(tmp_path, "held_cloth/data/seen.npz", "--poses", str(HELD / "poses.csv"))
+    fit = fitted(tmp_path, "held_cloth/data/seen.npz", "--poses", str(HELD / "poses.csv"), codes=(0, 4))
     assert fit.recordings[0].held_out < 1.2 * 7.3e-3
     for name, value in {"clock": -0.31, "cloth_bending": 6e-4, "cloth_air_normal": 0.6}.items():
         assert fit[name].lower < value < fit[name].upper, name
