@@ -112,3 +112,18 @@ def test_sets_of_a_box(tmp_path: Path) -> None:
     assert len(scene.solids["bar"].mesh.sets["end"]) == 1
     assert len(scene.pinned) == 4
     assert scene.quantities["hung_mass"].value == 0.01
+
+
+def test_yield(tmp_path: Path) -> None:
+    """Its quantities and its kind; what add_solid refuses is refused with the key's name."""
+    recorded(tmp_path)
+    more: dict[str, Any] = {
+        "marker": [{"marker": "tip", "solid": "bar", "place": [0.1, 0.01, 0.52]}],
+        "recording": [{"file": "bar.npz"}],
+    }
+    scene = study(tmp_path, BOX | {"yield_stress": 500.0, "hardening": 2e4}, **more).experiments[0].scene
+    assert scene.quantities["bar_yield_stress"].value == 500.0 and scene.quantities["bar_hardening"].value == 2e4
+    assert scene.group("bar_strain")[0].kind == "yielding_brick_strain"
+    for wrong, match in (({"hardening": 2e4}, "hardening"), ({"yield_stress": -1.0}, "yield_stress")):
+        with pytest.raises(sb.ConfigError, match=match):
+            study(tmp_path, BOX | wrong, **more)
