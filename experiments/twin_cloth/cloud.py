@@ -1,6 +1,6 @@
 """Two hammocks of the fabric seen by a depth camera: fits to unordered clouds beside fits to as many named markers.
 
-    python experiments/twin_cloth/cloud.py [--draws 20] [--beside 3]
+    python experiments/twin_cloth/cloud.py [--draws 20] [--first 0] [--beside 3]
 
 Every frame shows 800 points anywhere on the cloths, another 800 each time, with a noise of 3 mm along every axis; one
 in five is missing, where something passes in front of the cloth. The fit knows nothing of which point is which. The
@@ -80,18 +80,18 @@ def seen(x: Array, frame: int) -> Array:
     return (x[:, 0] < left) | (x[:, 0] > left + width)
 
 
-def shown(built: sb.Scene, states: Array, seed: int) -> tuple[sb.Cloud, sb.Recording, Spots]:
+def shown(built: sb.Scene, states: Array, seed: int, noise: float = NOISE) -> tuple[sb.Cloud, sb.Recording, Spots]:
     """What the camera sees as a cloud, and the same with named markers."""
     generator = np.random.default_rng([seed, 25])
     points = []
     for k, state in enumerate(states):
         (x,) = Spots.scattered(generator).positions(built, state[None])
         x = x[seen(x, k)]
-        points.append(x + NOISE * generator.standard_normal(x.shape))
+        points.append(x + noise * generator.standard_normal(x.shape))
     named = Spots.scattered(generator)
     x = named.positions(built, states)
     hidden = np.array([~seen(one, k) for k, one in enumerate(x)])
-    x = x + NOISE * generator.standard_normal(x.shape)
+    x = x + noise * generator.standard_normal(x.shape)
     x[hidden] = np.nan
     return sb.Cloud.of(points, TIMES, name="cloud"), sb.Recording(x, TIMES, name="markers"), named
 
@@ -119,15 +119,16 @@ def fitted(recording: sb.Recording, named: Spots | None = None) -> sb.Fit:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--draws", type=int, default=20, help="fits to clouds")
+    parser.add_argument("--first", type=int, default=0, help="seed of the first, to go on with a study in parts")
     parser.add_argument("--beside", type=int, default=3, help="of these also fits to markers, which take longer")
     given = parser.parse_args()
     built = scene(FINER_OF_DATA)
     states = sb.simulate(built, TIMES, OF_DATA, start=sb.equilibrium(built).positions).positions
     found: dict[str, list[sb.Fit]] = {"cloud": [], "markers": []}
-    for seed in range(given.draws):
+    for seed in range(given.first, given.first + given.draws):
         cloud, markers, named = shown(built, states, seed)
         found["cloud"].append(told(seed, "cloud", fitted(cloud)))
-        if seed < given.beside:
+        if seed < given.first + given.beside:
             found["markers"].append(told(seed, "markers", fitted(markers, named)))
     words, ok = table(found)
     folder = Path("out/twin_cloth")

@@ -66,6 +66,10 @@ class Shooting:
             raise InputError(field, "must be a length", own.window, "give the length of a window in s, or 'auto'")
         if own.loss is not None and not (is_number(own.loss) and own.loss > 0):
             raise InputError(f"{field}.loss", "must be positive", own.loss, "give it in m/s, or leave it out")
+        if not (is_number(own.steps) and own.steps >= 1):
+            raise InputError(
+                f"{field}.steps", "must be at least 1", own.steps, "give a number of steps, or leave it out"
+            )
         if fields := [other for other, is_given in beside.items() if is_given]:
             raise InputError(field, "does not go with", fields, "leave one of the two out")
         return own
