@@ -9,32 +9,59 @@ namespace sheetbend {
 template <class T, int N = 1>
 struct Dual {
   static constexpr int directions = N;
+  // Where directions fill more registers than there are, they are in memory whatever is done. Unrolled, an operation on them is a hundred instructions,
+  // which the processor fetches once each: a loop is faster, and a quarter of the code (docs/decisions/what-a-build-compiles.md).
+  static constexpr bool rolled = N * sizeof(T) > 14 * sizeof(double) * register_lanes;
   // Directions first, so that code on pairs of them and copies of the whole move the same 16 bytes: a load across two stores that are still
   // under way waits for both, which took more than half the time of a rope's Jacobian.
-  T d[N]{};
-  T v{};
+  T d[N];
+  T v;
 
-  Dual() = default;
-  Dual(double a) : v(a) {}
+  constexpr Dual() noexcept : d{}, v{} {}
+  Dual(double a) : d{}, v(a) {}
   Dual(const T& a)
     requires(!std::same_as<T, double>)
-      : v(a) {}
+      : d{}, v(a) {}
 
   Dual& operator+=(const Dual& b) {
     v = v + b.v;
-    for (int i = 0; i < N; ++i) d[i] = d[i] + b.d[i];
+    if constexpr (rolled)
+      each([&](int i) { d[i] = d[i] + b.d[i]; });
+    else
+      for (int i = 0; i < N; ++i) d[i] = d[i] + b.d[i];
     return *this;
   }
   Dual& operator-=(const Dual& b) {
     v = v - b.v;
-    for (int i = 0; i < N; ++i) d[i] = d[i] - b.d[i];
+    if constexpr (rolled)
+      each([&](int i) { d[i] = d[i] - b.d[i]; });
+    else
+      for (int i = 0; i < N; ++i) d[i] = d[i] - b.d[i];
     return *this;
   }
   Dual& operator*=(const Dual& b) { return *this = *this * b; }
 
   friend Dual operator-(const Dual& a) { return map(a, -a.v, T(-1.0)); }
-  friend Dual operator+(Dual a, const Dual& b) { return a += b; }
-  friend Dual operator-(Dual a, const Dual& b) { return a -= b; }
+  friend Dual operator+(Dual a, const Dual& b)
+    requires(!rolled)
+  {
+    return a += b;
+  }
+  friend Dual operator+(const Dual& a, const Dual& b)
+    requires rolled
+  {
+    return Dual(a.v + b.v, [&](int i) { return a.d[i] + b.d[i]; });
+  }
+  friend Dual operator-(Dual a, const Dual& b)
+    requires(!rolled)
+  {
+    return a -= b;
+  }
+  friend Dual operator-(const Dual& a, const Dual& b)
+    requires rolled
+  {
+    return Dual(a.v - b.v, [&](int i) { return a.d[i] - b.d[i]; });
+  }
   friend Dual operator*(const Dual& a, const Dual& b) { return map(a, b, a.v * b.v, b.v, a.v); }
   friend Dual operator*(double a, const Dual& b) { return map(b, a * b.v, a); }
   friend Dual operator/(const Dual& a, const Dual& b) {
@@ -52,16 +79,32 @@ struct Dual {
 
   // Chain rule: f(a) with value f and derivative fa; f(a, b) with derivatives fa, fb.
   static Dual map(const Dual& a, const T& f, const T& fa) {
+    if constexpr (rolled) return Dual(f, [&](int i) { return fa * a.d[i]; });
     Dual r;
     r.v = f;
     for (int i = 0; i < N; ++i) r.d[i] = fa * a.d[i];
     return r;
   }
   static Dual map(const Dual& a, const Dual& b, const T& f, const T& fa, const T& fb) {
+    if constexpr (rolled) return Dual(f, [&](int i) { return fa * a.d[i] + fb * b.d[i]; });
     Dual r;
     r.v = f;
     for (int i = 0; i < N; ++i) r.d[i] = fa * a.d[i] + fb * b.d[i];
     return r;
+  }
+
+ private:
+  // With value a and directions f(i); clears nothing first.
+  template <class F>
+  Dual(const T& a, const F& f) : v(a) {
+    each([&](int i) { d[i] = f(i); });
+  }
+
+  // f(i) for every direction i, in a loop.
+  template <class F>
+  static void each(const F& f) {
+#pragma GCC unroll 1
+    for (int i = 0; i < N; ++i) f(i);
   }
 };
 

@@ -9,15 +9,6 @@
 
 namespace sheetbend {
 
-// Doubles in a register of the instruction set that is compiled for.
-#if defined(__AVX512F__)
-inline constexpr int register_lanes = 8;
-#elif defined(__AVX__)
-inline constexpr int register_lanes = 4;
-#else
-inline constexpr int register_lanes = 2;
-#endif
-
 // Its pieces are registers: compilers take wider vectors apart badly. It is laid out the same on every instruction set.
 template <int N>
 struct alignas(8 * N) Lanes {

@@ -9,6 +9,15 @@
 
 namespace sheetbend {
 
+// Doubles in a register of the instruction set that is compiled for.
+#if defined(__AVX512F__)
+inline constexpr int register_lanes = 8;
+#elif defined(__AVX__)
+inline constexpr int register_lanes = 4;
+#else
+inline constexpr int register_lanes = 2;
+#endif
+
 inline double sqrt(double a) { return __builtin_sqrt(a); }
 inline double atan2(double y, double x) { return angle_of(y, x); }
 inline double sin(double a) { return std::sin(a); }
