@@ -1,4 +1,4 @@
-// The reverse of a constraint whose kind is a number (core/constraints/any_kind.h), compiled once per kind and scalar (any_kind_vjp.cpp).
+// The reverse of a constraint whose kind is a number (core/constraints/any_kind.h), compiled once per kind and scalar (any_kind_vjp*.cpp).
 #pragma once
 
 #include "core/constraints/any_kind.h"
