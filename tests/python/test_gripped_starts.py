@@ -12,10 +12,10 @@ from sheetbend.gripped.bounds import bounded
 from sheetbend.gripped.descent import Descent
 from sheetbend.gripped.ladder import TWIST
 from sheetbend.gripped.pieces import experiments_of, problem_of
-from sheetbend.gripped.raced import best_of_groups, points, rows
+from sheetbend.gripped.raced import points, rows
 from sheetbend.gripped.start import about, started
 from sheetbend.minimum.problem import FitProblem
-from sheetbend.minimum.race import Raced
+from sheetbend.minimum.race import Raced, groups_of
 from test_gripped_climb import MODEL, MOTION, shown
 
 LENGTHS = (0.45, 0.25, 0.12)
@@ -62,7 +62,8 @@ def test_every_start_has_a_row() -> None:
     u = problem().parameters.initial()
     made = [(50.0, 2), (4.0, 1), (5.0, 1), (np.inf, 0), (60.0, 3)]
     ended = [Raced(u, u + 0.1 * k, cost, 5, 5, "", group) for k, (cost, group) in enumerate(made)]
-    assert {number: end.cost for number, end in best_of_groups(ended).items()} == {1: 4.0, 2: 50.0, 3: 60.0}
+    best = {number: min(end.cost for end in group) for number, group in enumerate(groups_of(ended), 1)}
+    assert best == {1: 4.0, 2: 50.0, 3: 60.0}
     values = problem().parameters.to_physical(u)
     fits = {1: Descent({**values, "rope_other": 1.0}, 300.0, 6, True), 2: Descent(values, 200.0, 4, False)}
     found = rows(problem(), ended, fits)

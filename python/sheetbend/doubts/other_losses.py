@@ -61,13 +61,15 @@ def other_losses(problem: FitProblem, u: Array) -> dict[str, str]:
     """
     ok, r, J = problem.evaluate(u)
     groups = _unexplained(problem, r) if ok and np.isfinite(J).all() else []
+    if not groups:
+        return {}
     best: dict[int, tuple[float, Says]] = {}
     stepping = problem.of([in_steps(e, 1) for e in problem.experiments])
-    tried = list(_tried(stepping, u, groups)) if groups else []
+    tried = list(_tried(stepping, u, groups))
     for more, says in tried:
         after = _reached(more, u, J, groups)
         for k, group in enumerate(groups):
-            if after is None or (share := _less(group, after)) <= max(LESS, (best[k][0] if k in best else 0.0)):
+            if after is None or (share := _less(group, after)) <= max(LESS, best[k][0] if k in best else 0.0):
                 continue
             drop = group.left - float(after[group.mine] @ after[group.mine])
             if chance_of_drop(problem, u, after, group.mine, drop) < LEVEL / len(tried):

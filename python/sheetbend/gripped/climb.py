@@ -121,22 +121,18 @@ class Climb(Straight):
 
     def _put_back(self) -> None:
         """What is given and its split, with the markers where they were recorded."""
-        given, fitted, judged, waiting = (
-            tuple(self._recorded.get(m, m) for m in part)
-            for part in (self.given, self.split.fitted, self.split.judged, self.split.waiting)
-        )
-        self.given, self.beside = given, ()
-        self.split = replace(self.split, fitted=fitted, judged=judged, waiting=waiting)
+
+        def recorded(motion: GrippedMotion) -> GrippedMotion:
+            return self._recorded.get(motion, motion)
+
+        self.given, self.beside = tuple(recorded(m) for m in self.given), ()
+        self.split = self.split.each(recorded)
 
     def _moved(self, rope: Rope, offsets: Offsets) -> tuple[tuple[GrippedMotion, ...], Split]:
         """What is given and its split, with the markers on the rope's axis."""
         every = {m: m.moved(-beside(rope.model, m, rope.values, offsets)) for m in (*self.whole, *self.split.motions)}
         self._recorded |= {moved: self._recorded.get(m, m) for m, moved in every.items()}
-        fitted, judged, waiting = (
-            tuple(every[m] for m in part) for part in (self.split.fitted, self.split.judged, self.split.waiting)
-        )
-        moved = replace(self.split, fitted=fitted, judged=judged, waiting=waiting)
-        return tuple(every[m] for m in self.whole), moved
+        return tuple(every[m] for m in self.whole), self.split.each(every.__getitem__)
 
     def _reconsider(self, ladder: Sequence[Rung], late: Sequence[Rung]) -> None:
         """Take back offsets of grips and markers that stayed before a part of the rope itself did: they may have stood

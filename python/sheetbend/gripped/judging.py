@@ -6,7 +6,7 @@ must fall, and so many of them must lie below 1 that luck explains it badly (sig
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from math import comb
@@ -78,6 +78,12 @@ class Split:
     def motions(self) -> tuple[GrippedMotion, ...]:
         """Those that are fitted, then those that are judged."""
         return (*self.fitted, *self.judged)
+
+    def each(self, made: Callable[[GrippedMotion], GrippedMotion]) -> Split:
+        """The same with something else in place of every motion."""
+        parts = (self.fitted, self.judged, self.waiting)
+        fitted, judged, waiting = (tuple(made(m) for m in part) for part in parts)
+        return replace(self, fitted=fitted, judged=judged, waiting=waiting)
 
     def without(self, numbers: Collection[int]) -> Split:
         """The same without some of `motions`. If none is left to judge, the last of several fitted ones judges."""

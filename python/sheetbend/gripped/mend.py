@@ -68,10 +68,8 @@ def steadied_order(recording: Recording) -> tuple[Array, Mask]:
     """Positions (frames, markers, 3) m with the same order of neighbors in all frames, that of most frames, and NaN in
     place of zeros; (pairs, frames) where a pair was exchanged for that."""
     positions = np.where(_lost(recording)[:, :, None], np.nan, recording.positions)
-    wrong, least = (
-        np.zeros((positions.shape[1] - 1, len(positions)), dtype=bool),
-        _least_jump(recording.times, positions),
-    )
+    wrong = np.zeros((positions.shape[1] - 1, len(positions)), dtype=bool)
+    least = _least_jump(recording.times, positions)
     for k in range(len(wrong)):
         state = _turned(recording.times, positions[:, k], positions[:, k + 1], least)
         wrong[k] = state if 2 * state.sum() <= len(state) else ~state

@@ -46,15 +46,6 @@ def raced(problem: FitProblem, firsts: Sequence[Mapping[str, float]], count: int
     return race(Course(problem, ()), points(problem, firsts, count))
 
 
-def best_of_groups(ended: Sequence[Raced]) -> dict[int, Raced]:
-    """By the number of its group, the end that fits the short windows best."""
-    found: dict[int, Raced] = {}
-    for end in ended:
-        if end.group and (end.group not in found or end.cost < found[end.group].cost):
-            found[end.group] = end
-    return dict(sorted(found.items()))
-
-
 def rows(problem: FitProblem, ended: Sequence[Raced], fits: Mapping[int, Descent]) -> tuple[Start, ...]:
     """A row of the result for each start, the group first whose fit has the lowest cost; those that led nowhere last.
 

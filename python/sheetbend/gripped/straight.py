@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import SheetbendError
 from ..minimum.problem import FitProblem
+from ..minimum.race import groups_of
 from ..result.result import Start
 from .bounds import bounded
 from .descent import Descent, bearable, descend
@@ -18,7 +19,7 @@ from .ladder import Rung
 from .model import NAME, RopeModel
 from .motion import GrippedMotion
 from .pieces import experiments_of, problem_of
-from .raced import best_of_groups, raced, rows
+from .raced import raced, rows
 from .start import about, started
 from .steps import Rope
 from .windows import Span
@@ -109,10 +110,10 @@ class Straight:
                 problem = self._of_sound(problem, first.values) or problem
             ended = raced(problem, [candidate.quantities for candidate in firsts], count)
             fits, mine = dict[int, Descent](), []
-            for number, best in best_of_groups(ended).items():
-                values = problem.parameters.to_physical(best.u)
+            for number, group in enumerate(groups_of(ended), 1):
+                values = problem.parameters.to_physical(min(group, key=lambda end: end.cost).u)
                 found = self._through(replace(first, model=first.model.at(values), values=values))
-                name = f"{sum(one.group == number for one in ended)} of {count} starts end alike"
+                name = f"{len(group)} of {count} starts end alike"
                 if found is None:
                     self.say(f"{name}: diverges on longer windows")
                     continue

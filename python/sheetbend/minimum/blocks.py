@@ -27,6 +27,7 @@ from .coordinates import Coordinates
 from .counts import count
 from .parts import expanded_to
 from .problem import FitProblem
+from .triangle import triangle
 from .workers import Common
 
 CHUNK = 16  # recordings in a piece of work
@@ -58,15 +59,15 @@ class Reduced:
 def reduced(own: Array, shared: Array, r: Array) -> Reduced:
     """From columns (rows, q) and (rows, shared) and residuals (rows,)."""
     q, s = own.shape[1], shared.shape[1]
-    T = _triangle(np.column_stack([own, shared, r]))
+    T = _padded(np.column_stack([own, shared, r]))
     return Reduced(T[:q, :q], T[:q, q : q + s], T[:q, -1], T[q:, q : q + s], T[q:, -1])
 
 
-def _triangle(rows: Array) -> Array:
-    """(n, n) upper triangle of rows (any, n), zero where there are fewer."""
+def _padded(rows: Array) -> Array:
+    """(n, n) triangle of rows (any, n), zero where there are fewer."""
     n = rows.shape[1]
     T = np.zeros((n, n))
-    R = np.linalg.qr(rows, mode="r")
+    R = triangle(rows)
     T[: len(R)] = R
     return T
 
@@ -266,7 +267,7 @@ def _evaluated(recordings: _Recordings, item: Item) -> list[Array | float | str]
         if isinstance(made, str):
             return [made]
         r, J = made
-        found.append(_triangle(np.column_stack([J[:, own], J[:, shared], r])) if item[3] else float(np.sqrt(r @ r)))
+        found.append(_padded(np.column_stack([J[:, own], J[:, shared], r])) if item[3] else float(np.sqrt(r @ r)))
     return found
 
 

@@ -20,6 +20,7 @@ from ..arrays.timeseries import Array
 from ..errors import SheetbendError
 from .approach import Approach, Tally
 from .problem import FitProblem
+from .triangle import triangle
 from .windows import STEPS, TOLERANCE, along, cut
 from .workers import Common
 
@@ -98,7 +99,7 @@ class Course:
         """To compare others with."""
         _, r, J = self.last.evaluate(end.u)
         floor = 0.5 * FLOOR**2 * len(r)
-        return Reference(end.u, end.cost, np.asarray(np.linalg.qr(J, mode="r")), floor)
+        return Reference(end.u, end.cost, triangle(J), floor)
 
 
 Observe = Callable[[Raced, int], None]
@@ -121,6 +122,11 @@ def race(course: Course, points: Sequence[Array], observe: Observe | None = None
                 observe(end, len(ended))
         ended, known = _grouped(course, ended, references)
     return tuple(ended)
+
+
+def groups_of(ended: Sequence[Raced]) -> list[list[Raced]]:
+    """Those that reached a minimum, by its number: group k is at place k - 1."""
+    return [[end for end in ended if end.group == number] for number in range(1, 1 + max(end.group for end in ended))]
 
 
 def _grouped(

@@ -19,7 +19,7 @@ from .conditioning import Condition
 from .growth import Growth, growths
 from .optimizers import Minimum, Observer, Progress, judged, minimize, named
 from .problem import FitProblem
-from .race import Course, Raced, race
+from .race import Course, Raced, groups_of, race
 from .starts import drawn, off_bounds
 from .windows import STEPS, TOLERANCE, along, chosen, cut
 
@@ -125,8 +125,7 @@ class Search:
         raced = race(course, points, observe)
         onward = replace(self, windows=() if window is None else (window,))
         ways = []
-        for number in range(1, 1 + max(end.group for end in raced)):
-            group = [end for end in raced if end.group == number]
+        for number, group in enumerate(groups_of(raced), 1):
             best, first = min(group, key=lambda end: end.cost), whole.cost(group[0].first)
             took = Tally(0, sum(end.evaluations for end in group), sum(end.jacobians for end in group))
             ways.append(_Way(onward, problem, name, best.u, number, taken=took, first=_finite(first)))
