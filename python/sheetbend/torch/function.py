@@ -9,13 +9,14 @@ and jvp only ever call Functions:
     Jvp       inputs_dot -> states_dot     backward: VjpDot and Vjp          jvp: refused
     VjpDot    derivative of Vjp            refused: a third derivative
 
-Jvp's backward by the inputs is the gradient of <states_bar, J inputs_dot> = <inputs_dot, J^T states_bar>, hence VjpDot
-again: second derivatives are symmetric. All tensors have a leading batch dimension; a vmap rule folds the mapped
-dimension into it.
+The backward of Vjp and of Jvp differentiates one number, <states_bar, J inputs_dot> = <inputs_dot, J^T states_bar>,
+with respect to the inputs (VjpDot) and to the factor that each takes. All tensors have a leading batch dimension; a
+vmap rule folds the mapped dimension into it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NoReturn, Protocol
 
 import numpy as np
@@ -96,12 +97,7 @@ class Vjp(_ResponseFunction):
     @staticmethod
     def backward(ctx: Any, direction: Tensor) -> tuple[None, Tensor | None, Tensor | None]:
         inputs, states_bar = ctx.saved_tensors
-        by_inputs = by_bar = None
-        if ctx.needs_input_grad[1]:
-            by_inputs = _apply(VjpDot, ctx.response, inputs, direction, states_bar, torch.zeros_like(states_bar))
-        if ctx.needs_input_grad[2]:
-            by_bar = _apply(Jvp, ctx.response, inputs, direction)
-        return None, by_inputs, by_bar
+        return _product_vjp(ctx, inputs, direction, states_bar, lambda: _apply(Jvp, ctx.response, inputs, direction))
 
     @staticmethod
     def jvp(ctx: Any, _: None, inputs_dot: Tensor, states_bar_dot: Tensor) -> Tensor:
@@ -119,12 +115,7 @@ class Jvp(_ResponseFunction):
     @staticmethod
     def backward(ctx: Any, states_bar: Tensor) -> tuple[None, Tensor | None, Tensor | None]:
         inputs, inputs_dot = ctx.saved_tensors
-        by_inputs = by_dot = None
-        if ctx.needs_input_grad[1]:
-            by_inputs = _apply(VjpDot, ctx.response, inputs, inputs_dot, states_bar, torch.zeros_like(states_bar))
-        if ctx.needs_input_grad[2]:
-            by_dot = _apply(Vjp, ctx.response, inputs, states_bar)
-        return None, by_inputs, by_dot
+        return _product_vjp(ctx, inputs, inputs_dot, states_bar, lambda: _apply(Vjp, ctx.response, inputs, states_bar))
 
     @staticmethod
     def jvp(ctx: Any, *_: Any) -> NoReturn:
@@ -151,6 +142,19 @@ class VjpDot(_ResponseFunction):
 
 
 _THIRD = "sheetbend.torch.function.VjpDot: third derivatives are not available. Fix: differentiate at most twice"
+
+
+def _product_vjp(
+    ctx: Any, inputs: Tensor, inputs_dot: Tensor, states_bar: Tensor, factor_bar: Callable[[], Tensor]
+) -> tuple[None, Tensor | None, Tensor | None]:
+    """What the backward of Vjp and of Jvp returns: gradients of <states_bar, J inputs_dot> with respect to the inputs
+    and to the factor that the Function takes, where they are needed."""
+    inputs_bar = bar = None
+    if ctx.needs_input_grad[1]:
+        inputs_bar = _apply(VjpDot, ctx.response, inputs, inputs_dot, states_bar, torch.zeros_like(states_bar))
+    if ctx.needs_input_grad[2]:
+        bar = factor_bar()
+    return None, inputs_bar, bar
 
 
 def _apply(function: type[Function], response: Response, *tensors: Tensor) -> Tensor:
