@@ -40,18 +40,18 @@ def test_an_edge_is_where_the_motion_of_the_rows_runs_together(beyond: float) ->
     """Within three standard deviations, and these are 3 mm and less. A noise of 2 mm draws it to no side."""
     x, flat = swaying(beyond, 2e-3)
     found = margin(x, flat, 1, 1)
-    assert found.sd is not None and found.sd < 4e-3
-    assert found.length == approx(beyond, abs=3.0 * found.sd)
+    assert found.edge is not None and found.edge.sd < 4e-3
+    assert found.length == found.edge.beyond == approx(beyond, abs=3.0 * found.edge.sd)
     assert found.share == approx(found.length / pitches(flat)[1])
-    assert found.edge is not None and np.nanmean(found.edge[..., 2]) == approx(1.0, abs=3.0 * found.sd + 1e-3)
-    assert found.along == approx([0.0, 0.05, 0.10, 0.15])
+    assert np.nanmean(found.edge.points[..., 2]) == approx(1.0, abs=3.0 * found.edge.sd + 1e-3)
+    assert found.edge.along == approx([0.0, 0.05, 0.10, 0.15])
 
 
 def test_the_edge_of_what_moves_with_a_holder_is_told_in_its_frame() -> None:
     x, flat = swaying(0.03, 1e-3)
     carried = np.stack([np.zeros(len(x)), 0.3 * np.sin(np.arange(len(x)) / 7.0), np.zeros(len(x))], axis=1)
     found = margin(x + carried[:, None], flat, 1, 1, lambda edge: at_rest(edge - carried[:, None]))
-    assert found.sd is not None and found.length == approx(0.03, abs=3.0 * found.sd)
+    assert found.edge is not None and found.length == approx(0.03, abs=3.0 * found.edge.sd)
 
 
 @pytest.mark.parametrize("why", ["still", "two rows", "few frames", "noisy"])
@@ -62,7 +62,7 @@ def test_half_of_the_distance_between_rows_is_taken_where_no_motion_tells_more(w
     if why == "two rows":
         x, flat = x[:, :8], flat[:8]
     found = margin(x, flat, 1, 1)
-    assert found.sd is None and found.edge is None
+    assert found.edge is None
     assert (found.share, found.length) == approx((0.5, 0.04))
 
 
@@ -70,8 +70,8 @@ def test_a_lost_marker_leaves_out_its_frames_alone() -> None:
     x, flat = swaying(0.03, 1e-3)
     x[10:30, 23] = np.nan
     found = margin(x, flat, 1, 1)
-    assert found.sd is not None and found.length == approx(0.03, abs=3.0 * found.sd)
-    assert found.edge is not None and np.isnan(found.edge[10:30]).all() and np.isfinite(found.edge[30:]).all()
+    assert found.edge is not None and found.length == approx(0.03, abs=3.0 * found.edge.sd)
+    assert np.isnan(found.edge.points[10:30]).all() and np.isfinite(found.edge.points[30:]).all()
 
 
 def test_the_held_edge_of_a_cloth_in_wind(tmp_path: Path) -> None:

@@ -75,7 +75,7 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     unknown = [*unknown_of(s, sheets, measured), *unknown]
     for sheet in sheets:
         if sheet.ride is not None:
-            shown = sheet.held[0].margin is not None and sheet.held[0].margin.sd is not None
+            shown = sheet.held[0].edge is not None
             more = robot.notes(sheet.ride, "the held edge" if shown else "the upper row of markers")
             notes, unknown = notes + more[0], unknown + more[1]
     used = {k for sheet in sheets for hold in sheet.held for k in hold.markers}
@@ -110,7 +110,7 @@ def _on_tool(s: Seen, own: list[int], flat: Array, held: list[Hold], poses: robo
     ride = robot.riding(x[:, row], t, poses)
     told = margin(x[:, own], flat, *SIDES[hold.side], lambda edge: robot.off_near(edge, t, poses, ride.shift))
     if told.edge is not None:
-        ride = robot.riding(told.edge, t, poses)
+        ride = robot.riding(told.edge.points, t, poses)
     return replace(hold, tool=robot.TOOL, beyond=told.length, margin=told), ride
 
 
@@ -158,9 +158,9 @@ def _looked_at(
     at_rest = not s.static and not any(hold.moves for hold in held) and not is_slung
     wind = _wind(s, own, [own[k] for k in row_of(flat, "top", apart)], up, density) if at_rest else None
     origin = place - axes.T @ low
-    for told in (hold.margin for hold in held if ride is None and not is_slung):
-        if told is not None and told.edge is not None and told.along is not None:  # all frames show an edge at rest
-            origin = np.nanmean(told.edge, axis=(0, 1)) - axes.T @ [told.along.mean() + low[0], height]
+    for edge in (hold.edge for hold in held if ride is None and not is_slung):
+        if edge is not None:  # all frames show an edge at rest
+            origin = np.nanmean(edge.points, axis=(0, 1)) - axes.T @ [edge.along.mean() + low[0], height]
     rests = not any(hold.moves for hold in held) and not is_slung  # a grip starts where its markers are
     starts_flat = rests and not s.static and _lies_flat(s, own)
     return Sheet(
@@ -230,8 +230,8 @@ def _cloth(s: Seen, sheet: Sheet, density: float) -> list[str]:
     origin, axes, ahead = sheet.origin, list(sheet.axes), list[str]()
     if sheet.ride is not None:
         (hold,), numbers = sheet.held, {k: i for i, k in enumerate(sheet.own)}
-        if hold.margin is not None and hold.margin.along is not None:
-            along, below = hold.margin.along + sheet.low[0], 0.0
+        if hold.edge is not None:
+            along, below = hold.edge.along + sheet.low[0], 0.0
         else:
             along, below = sheet.flat[[numbers[k] for k in hold.markers], 0], hold.beyond
         origin, *axes, position = robot.placed(sheet.ride, s, along, below, hold.beyond, sheet.height)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays.timeseries import default_max_gap
-from .margin import HALF, Margin, margin
+from .margin import HALF, Edge, Margin, margin
 from .seen import Seen
 from .sheet import laid, spacing
 
@@ -37,7 +37,7 @@ class Hold:
         along: m, where they are along the side, in the coordinates of the markers' places; of a holder.
         bar: (3,) direction of the side, where one marker of a holder alone shows where it is.
         tool: name of the tool that moves it, in place of the markers.
-        margin: how `beyond` is told, of an edge beyond the cloth's own row that rests or that a tool moves.
+        margin: where `beyond` is from, of an edge beyond the cloth's own row that rests or that a tool moves.
     """
 
     side: str
@@ -50,6 +50,11 @@ class Hold:
     bar: tuple[float, ...] | None = None
     tool: str | None = None
     margin: Margin | None = None
+
+    @property
+    def edge(self) -> Edge | None:
+        """The edge beyond the cloth's own row, where the motion shows it."""
+        return None if self.margin is None else self.margin.edge
 
     def tables(self, names: Sequence[str], s: Seen) -> tuple[list[Any], list[Any], list[Any]]:
         """Sets that are pinned, sets, and grips of a cloth."""

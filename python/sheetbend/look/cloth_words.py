@@ -49,11 +49,11 @@ def seen_of(s: Seen, sheet: Sheet, several: bool) -> list[str]:
             if not hold.moves:
                 how = "hardly moves: the edge beyond it is taken as held"
             held.append(f"the {_row(hold)} row of markers, {of}, {how}")
-        if hold.margin is not None and hold.margin.sd is not None:
+        if hold.edge is not None:
             how = "rests" if hold.tool is None else "moves as the tool does"
             held.append(
-                f"the held edge is {1e3 * hold.margin.length:.3g} mm beyond the {_row(hold)} row of markers, with a "
-                f"standard deviation of {1e3 * hold.margin.sd:.2g} mm: a parabola through the outer markers "
+                f"the held edge is {1e3 * hold.edge.beyond:.3g} mm beyond the {_row(hold)} row of markers, with a "
+                f"standard deviation of {1e3 * hold.edge.sd:.2g} mm: a parabola through the outer markers "
                 f"of each column {how} there"
             )
     if sheet.slung:
@@ -91,7 +91,7 @@ def unknown_of(s: Seen, sheets: Sequence[Sheet], measured: Measured) -> list[str
         "and the markers on the flat cloth, and which way its warp runs, and correct mesh, origin and markers"
     )
     for hold in held:
-        if hold.margin is not None and hold.margin.sd is None:
+        if hold.margin is not None and hold.margin.edge is None:
             said.append(
                 f"how far the held edge is beyond the {_row(hold)} row of markers: {1e3 * hold.margin.length:.0f} mm, "
                 "half of the distance between rows, is taken, because the motion of the rows does not show it. Measure "

@@ -24,22 +24,34 @@ FRAMES = 20  # with all these markers, at least
 Off = Callable[[Array], float]
 
 
+class Edge(NamedTuple):
+    """An edge of a cloth, found from the motion of the rows.
+
+    Attributes:
+        beyond: m, how far it is from the outer row of markers.
+        sd: m, standard deviation of `beyond`.
+        points: (frames, columns, 3) m, where it is, NaN where markers are lost.
+        along: (columns,) m, where these points are along the edge, as in the layout.
+    """
+
+    beyond: float
+    sd: float
+    points: Array
+    along: Array
+
+
 class Margin(NamedTuple):
     """How far a cloth goes on beyond a row of markers.
 
     Attributes:
         share: of the distance between rows.
         length: m.
-        sd: m, its standard deviation; None where no motion tells it and `HALF` is taken.
-        edge: (frames, columns, 3) m, where the edge is, NaN where markers are lost; None where `sd` is.
-        along: (columns,) m, where these points are along the edge, as in the layout.
+        edge: where it ends; None where the motion does not show it and `HALF` is taken.
     """
 
     share: float
     length: float
-    sd: float | None = None
-    edge: Array | None = None
-    along: Array | None = None
+    edge: Edge | None
 
 
 def pitches(flat: Array) -> Array:
@@ -60,8 +72,8 @@ def at_rest(edge: Array) -> float:
 
 
 def margin(x: Array, flat: Array, axis: int, sign: int, off: Off = at_rest) -> Margin:
-    """How far the cloth goes on beyond its outer row on one side, as its motion tells it; else half of the distance
-    between rows.
+    """How far the cloth goes on beyond its outer row on one side: to the edge that its motion shows, else by half of
+    the distance between rows.
 
     Three markers of a column follow the bend of the cloth best; four average more noise, and count where that is what
     limits three.
@@ -73,16 +85,16 @@ def margin(x: Array, flat: Array, axis: int, sign: int, off: Off = at_rest) -> M
         off: m, how far points (frames, k, 3) are off the motion of what holds the edge.
     """
     pitch = pitches(flat)
-    found = _told(x, flat, axis, sign, off, pitch, FEWEST)
-    if found is None or found.sd is None or found.sd > NOISY * pitch[axis]:
-        found = _told(x, flat, axis, sign, off, pitch, ROWS)
-    if found is None or found.sd is None or found.sd > KNOWN * pitch[axis]:
-        return Margin(HALF, HALF * float(pitch[axis]))
-    return found
+    edge = _edge(x, flat, axis, sign, off, pitch, FEWEST)
+    if edge is None or edge.sd > NOISY * pitch[axis]:
+        edge = _edge(x, flat, axis, sign, off, pitch, ROWS)
+    if edge is None or edge.sd > KNOWN * pitch[axis]:
+        return Margin(HALF, HALF * float(pitch[axis]), None)
+    return Margin(edge.beyond / float(pitch[axis]), edge.beyond, edge)
 
 
-def _told(x: Array, flat: Array, axis: int, sign: int, off: Off, pitch: Array, most: int) -> Margin | None:
-    """What parabolas through up to `most` markers of each column tell; None where they run together nowhere."""
+def _edge(x: Array, flat: Array, axis: int, sign: int, off: Off, pitch: Array, most: int) -> Edge | None:
+    """The edge where parabolas through up to `most` markers of each column run together; None where they do not."""
     columns = _columns(flat, axis, sign, pitch, most)
     if len(columns) < 2:
         return None
@@ -91,7 +103,7 @@ def _told(x: Array, flat: Array, axis: int, sign: int, off: Off, pitch: Array, m
     if seen.sum() < FRAMES:
         return None
 
-    def edge_at(beyond: float) -> tuple[Array, float]:
+    def points_at(beyond: float) -> tuple[Array, float]:
         """Points (frames, columns, 3) at a distance beyond the outer row, NaN where a marker is lost, and the square
         of their noise over that of a marker."""
         weights = [_onward(own, beyond) for own in inward]
@@ -100,25 +112,25 @@ def _told(x: Array, flat: Array, axis: int, sign: int, off: Off, pitch: Array, m
         ends[~seen] = np.nan
         return ends, float(np.mean([w @ w for w in weights]))
 
-    def told_at(beyond: float) -> float:
-        ends, noise = edge_at(beyond)
+    def off_at(beyond: float) -> float:
+        ends, noise = points_at(beyond)
         return off(ends) ** 2 / noise
 
     step = STEP * float(pitch[axis])
     tried = step * np.arange(round(LEAST / STEP), round(MOST / STEP) + 1)
-    told = np.array([told_at(beyond) for beyond in tried])
-    best = int(np.argmin(told))
+    square = np.array([off_at(beyond) for beyond in tried])
+    best = int(np.argmin(square))
     if not 0 < best < len(tried) - 1:
         return None
-    low, least, high = told[best - 1 : best + 2]
+    low, least, high = square[best - 1 : best + 2]
     bend = (low - 2.0 * least + high) / step**2
-    length = float(tried[best] + 0.5 * (low - high) / (bend * step))
+    beyond = float(tried[best] + 0.5 * (low - high) / (bend * step))
     sd = float(np.sqrt(2.0 * least / (bend * seen.sum() * len(columns))))
-    if length < -2.0 * sd:  # no edge is inside of the markers
+    if beyond < -2.0 * sd:  # no edge is inside of the markers
         return None
-    length = max(0.0, length)
+    beyond = max(0.0, beyond)
     along = np.array([flat[column[0], 1 - axis] for column in columns])
-    return Margin(length / float(pitch[axis]), length, sd, edge_at(length)[0], along)
+    return Edge(beyond, sd, points_at(beyond)[0], along)
 
 
 def _columns(flat: Array, axis: int, sign: int, pitch: Array, most: int) -> list[list[int]]:
