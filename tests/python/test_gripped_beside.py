@@ -13,6 +13,7 @@ from sheetbend.gripped.judging import predict
 from sheetbend.gripped.ladder import BESIDE, TWIST
 from sheetbend.gripped.offsets import offset_reach
 from sheetbend.gripped.pieces import experiments_of, problem_of
+from sheetbend.gripped.search import Search
 from sheetbend.gripped.steps import Rope
 from sheetbend.report.scores import coordinate_error
 from test_gripped_motion import carried_about, model_of
@@ -78,18 +79,18 @@ def test_intervals_count_offsets_that_were_found_as_if_they_were_not() -> None:
 
 
 def climb_of(motions: list[GrippedMotion]) -> Climb:
-    climb = Climb(motions, 0.25, ((0.5, 1.0), (1.0, 3.0)), 1, lambda text: None)
+    climb = Climb(Search(motions, 0.25, ((0.5, 1.0), (1.0, 3.0)), 1, lambda text: None))
     parameters = tuple(p for p in TWIST.parameters if p.name == "rope_EI")
-    climb.rope = climb._judged(Rope(MODEL, parameters, {"rope_EI": 0.02}))
+    climb.rope = climb.search.judged(Rope(MODEL, parameters, {"rope_EI": 0.02}))
     return climb
 
 
 def test_the_rung_stays_where_markers_sit_beside_the_rope() -> None:
     climb = climb_of([recorded(OFFSETS, k, f"{k}") for k in range(4)])
-    before = climb.split
+    before = climb.search.split
     assert climb._climbed(BESIDE)
     assert np.abs(np.subtract(climb.beside, OFFSETS)).mean() < 0.3 * np.abs(OFFSETS).mean()
-    assert len(climb.whole) == 4 and climb.split is not before
+    assert len(climb.search.whole) == 4 and climb.search.split is not before
     once = climb.beside
     climb._climbed(BESIDE)  # little is left; it adds to what was found
     assert np.abs(np.subtract(climb.beside, once)).max() < 5e-4
@@ -98,10 +99,10 @@ def test_the_rung_stays_where_markers_sit_beside_the_rope() -> None:
 def test_recordings_stay_as_they_are_where_the_rung_does_not_help(monkeypatch: pytest.MonkeyPatch) -> None:
     motions = [recorded(OFFSETS, k, f"{k}") for k in range(4)]
     climb = climb_of(motions)
-    before = climb.split
-    monkeypatch.setattr(Climb, "_judged", lambda self, rope: climb.rope)  # no better
+    before = climb.search.split
+    monkeypatch.setattr(Search, "judged", lambda self, rope: climb.rope)  # no better
     assert not climb._climbed(BESIDE)
-    assert climb.beside == () and climb.split is before and climb.whole == motions
+    assert climb.beside == () and climb.search.split is before and climb.search.whole == motions
 
 
 def test_a_fit_predicts_with_its_offsets_and_reports_them() -> None:

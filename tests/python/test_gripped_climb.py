@@ -31,6 +31,7 @@ from sheetbend.gripped.ladder import (
 )
 from sheetbend.gripped.model import place_of
 from sheetbend.gripped.pieces import experiments_of, problem_of
+from sheetbend.gripped.search import Search
 from sheetbend.gripped.start import about, started, whole
 from sheetbend.gripped.steps import Rope
 from sheetbend.minimum.journal import Evaluator
@@ -194,7 +195,7 @@ class TestDescent:
 class TestClimb:
     def climbed(self, motions: list[GrippedMotion], *more: Rung) -> tuple[Climb, list[str]]:
         said: list[str] = []
-        climb = Climb(motions, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, said.append)
+        climb = Climb(Search(motions, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, said.append))
         model = RopeModel(density=0.06, nominal=MODEL.nominal, values={}, smoothing=0.0)
         twist = replace(TWIST, parameters=TWIST.parameters[:4])
         climb.run([model], [twist, *more], (0.3,), 12)
@@ -205,12 +206,12 @@ class TestClimb:
         climb, said = self.climbed([*good[:2], shaken("bad"), *good[2:]])
         assert climb.rope is not None
         assert climb.rope.values["rope_EI"] == pytest.approx(0.03, rel=0.15)
-        assert [m.recording.name for m in climb.whole] == ["0", "1", "2", "3", "4"]
-        (sentence,) = climb.left_out
+        assert [m.recording.name for m in climb.search.whole] == ["0", "1", "2", "3", "4"]
+        (sentence,) = climb.search.left_out
         assert sentence.startswith("bad is left out of the fit: its prediction diverges") and sentence in said
 
     def test_of_two_gravities_the_one_that_predicts_better_is_taken(self) -> None:
-        climb = Climb([shown("only")], 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, lambda text: None)
+        climb = Climb(Search([shown("only")], 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, lambda text: None))
         model = RopeModel(density=0.06, nominal=MODEL.nominal, values={}, smoothing=0.0)
         models = [replace(model, gravity=g) for g in ((0.0, -9.81, 0.0), model.gravity)]
         climb.run(models, [replace(TWIST, parameters=TWIST.parameters[:4])], (0.3,), 12)
@@ -219,8 +220,8 @@ class TestClimb:
     def test_from_one_recording_a_rung_is_judged_by_its_end(self) -> None:
         """Once nothing was left to judge by, and every rung stayed."""
         climb, _ = self.climbed([shown("only")], TILTS)
-        assert [m.recording.name for m in climb.whole] == ["only"] and climb.whole[0].seconds == 1.0
-        assert len(climb.split.fitted[0].recording.times) < 80
+        assert [m.recording.name for m in climb.search.whole] == ["only"] and climb.search.whole[0].seconds == 1.0
+        assert len(climb.search.split.fitted[0].recording.times) < 80
         assert climb.steps[0].stays and (climb.steps[1].count, climb.steps[1].ratio is None) == (4, False)
 
     def test_a_rung_is_tried_again_after_a_later_one_stayed(self, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -245,8 +246,8 @@ class TestClimb:
         x, rng, said = shown().recording.positions, np.random.default_rng(0), list[str]()
         noisy = [replace(MOTION.recording, positions=x + 1e-3 * rng.standard_normal(x.shape)) for _ in range(5)]
         motions = [replace(MOTION, recording=replace(r, name=f"{k}")) for k, r in enumerate(noisy)]
-        climb = Climb(motions, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, said.append)
-        climb.rope = climb._judged(Rope(MODEL.at(TRUE), STIFFNESS, TRUE))
+        climb = Climb(Search(motions, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, said.append))
+        climb.rope = climb.search.judged(Rope(MODEL.at(TRUE), STIFFNESS, TRUE))
         tried: list[str] = []
         monkeypatch.setattr(Climb, "_long", lambda self, name, *rest: tried.append(name))
         assert not climb._climbed(MARKERS) and tried == []
@@ -260,11 +261,11 @@ class TestClimb:
         (x,) = predict(model, [MOTION], {**TRUE, **moved})
         motions = [replace(MOTION, recording=replace(MOTION.recording, positions=x, name=f"{k}")) for k in range(5)]
         rope = Rope(MODEL.at(TRUE), STIFFNESS, TRUE)
-        climb = Climb(motions, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, lambda text: None)
-        climb.rope = climb._judged(rope)
+        climb = Climb(Search(motions, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, lambda text: None))
+        climb.rope = climb.search.judged(rope)
         start = Rope(*climb._with(SHIFTS, rope), rope.values)
-        problem = climb._problem(start, climb.longest)
-        told = first_order(problem, start.model, rope.values, climb.split)
+        problem = climb.search.problem(start, climb.search.longest)
+        told = first_order(problem, start.model, rope.values, climb.search.split)
         assert told is not None and told.ratio < 0.3 and told.fitted < 0.3 and told.stays
 
     def shifted(self, values: dict[str, float]) -> list[GrippedMotion]:
@@ -276,10 +277,10 @@ class TestClimb:
 
     def reconsidered(self, motions: list[GrippedMotion], shifts: dict[str, float]) -> tuple[Climb, Rope]:
         """A rope whose grips were shifted before something else stayed, after a second look, and how it was before."""
-        climb = Climb(motions, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, lambda text: None)
+        climb = Climb(Search(motions, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, lambda text: None))
         values = {**TRUE, **{p.name: shifts.get(p.name, 0.0) for p in SHIFTS.parameters}}
         model = SHIFTS.added_to(MODEL).at(values)
-        before = climb.rope = climb._judged(Rope(model, (*STIFFNESS, *SHIFTS.parameters), values))
+        before = climb.rope = climb.search.judged(Rope(model, (*STIFFNESS, *SHIFTS.parameters), values))
         climb._reconsider((TWIST, TILTS, VARYING, SHIFTS, MARKERS), [VARYING])
         return climb, before
 
@@ -299,79 +300,84 @@ class TestClimb:
 
     def test_all_ends_as_before_where_that_predicts_better(self, monkeypatch: pytest.MonkeyPatch) -> None:
         moved = {"rope_start_shift_1": 0.006, "rope_end_shift_2": -0.006}
-        monkeypatch.setattr(Climb, "_climbed", lambda self, rung: False)
+
+        def climbed(climb: Climb, _: Rung) -> bool:
+            climb.search.leave_out(np.array([1.0, 1.0, 1.0, 1.0, np.inf]))
+            return False
+
+        monkeypatch.setattr(Climb, "_climbed", climbed)
         climb, before = self.reconsidered(self.shifted(moved), moved)
-        assert climb.rope is before
+        assert climb.rope is before and climb.search.left_out == [] and len(climb.search.whole) == 5
         assert [(s.name, s.stays) for s in climb.steps] == [(f"without {SHIFTS.name}", False)]
 
     def test_recordings_go_back_to_where_they_were_and_onto_the_axis_again(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         recorded = [shown(f"{k}") for k in range(5)]
-        climb = Climb(recorded, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, lambda text: None)
+        climb = Climb(Search(recorded, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, lambda text: None))
         rope = Rope(MODEL.at(TRUE), STIFFNESS, TRUE)
         offsets = ((1e-3, 0.0),) * len(MOTION.free)
         for _ in range(2):
-            climb.given, climb.split = climb._moved(rope, offsets)
-        climb.beside, climb.rope = ((2e-3, 0.0),) * len(MOTION.free), climb._judged(rope)
-        moved, seen = climb.given, list[tuple[GrippedMotion, ...]]()
-        monkeypatch.setattr(Climb, "_climbed", lambda self, rung: seen.append(self.given) or False)
+            climb.search.given, climb.search.split = climb._moved(rope, offsets)
+        climb.beside, climb.rope = ((2e-3, 0.0),) * len(MOTION.free), climb.search.judged(rope)
+        moved, seen = climb.search.given, list[tuple[GrippedMotion, ...]]()
+        monkeypatch.setattr(Climb, "_climbed", lambda self, rung: seen.append(self.search.given) or False)
         climb._reconsider((TWIST, VARYING, BESIDE), [VARYING])
         assert seen == [tuple(recorded)] and climb.beside == () and climb.rope is not None
-        assert climb.split.motions == Split.of(recorded, 0.25).motions and climb.given != moved
+        assert climb.search.split.motions == Split.of(recorded, 0.25).motions and climb.search.given != moved
 
     def test_the_only_recording_that_judges_can_be_left_out(self) -> None:
         """It once stayed, and every rung was judged by the one recording that does not belong."""
         said: list[str] = []
         motions = [replace(MOTION, recording=replace(MOTION.recording, name=f"{k}")) for k in range(4)]
-        climb = Climb(motions, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, said.append)
-        assert climb.split.judged == (motions[0],)
-        assert climb._leave_out(np.array([1.0, 1.1, 0.9, np.inf]))
+        search = Search(motions, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, said.append)
+        assert search.split.judged == (motions[0],)
+        assert search.leave_out(np.array([1.0, 1.1, 0.9, np.inf]))
         assert said == ["0 is left out of the fit: its prediction diverges"]
-        assert climb.split.fitted == tuple(motions[1:3]) and climb.split.judged == (motions[3],)
+        assert search.split.fitted == tuple(motions[1:3]) and search.split.judged == (motions[3],)
 
     def test_a_judged_recording_that_shows_nothing_is_left_out_for_that(self) -> None:
         """Its free markers are lost after the first two frames. Once its prediction was said to diverge."""
         motions = [replace(MOTION, recording=replace(MOTION.recording, name=f"{k}")) for k in range(5)]
-        climb = Climb(motions, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, lambda text: None)
-        (judged,) = climb.split.judged
+        search = Search(motions, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, lambda text: None)
+        (judged,) = search.split.judged
         x = judged.recording.positions.copy()
         x[2:, list(judged.free)] = np.nan
         lost = replace(judged, recording=replace(judged.recording, positions=x))
-        climb.split = replace(climb.split, judged=(lost,))
-        assert climb._leave_out(errors_of(MODEL, TRUE, climb.split).whole)
+        search.split = replace(search.split, judged=(lost,))
+        assert search.leave_out(errors_of(MODEL, TRUE, search.split).whole)
         name = judged.recording.name
         unseen = "none of its free markers is seen where it would be judged"
-        assert climb.left_out == [f"{name} is left out of the fit: {unseen}"]
-        assert len(climb.split.fitted) == 3 and len(climb.split.judged) == 1
+        assert search.left_out == [f"{name} is left out of the fit: {unseen}"]
+        assert len(search.split.fitted) == 3 and len(search.split.judged) == 1
 
     def test_what_waited_is_predicted_at_the_end(self) -> None:
         """A recording that does not belong is left out of the fit that counts, whether or not rungs saw it."""
         motions = self.shifted({})
-        climb = Climb(motions, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, lambda text: None)
-        kept, bad = climb.split.fitted[:2], shaken("bad")
-        climb.given = (*motions, bad)
-        climb.split = replace(climb.split, fitted=kept, waiting=(bad, *climb.split.fitted[2:]))
-        assert bad in climb.whole
-        climb._admit(climb._judged(Rope(MODEL.at(TRUE), STIFFNESS, TRUE)))
-        assert climb.whole == motions and len(climb.split.waiting) == 2
-        assert climb.left_out == ["bad is left out of the fit: its prediction diverges"]
+        search = Search(motions, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, lambda text: None)
+        kept, bad = search.split.fitted[:2], shaken("bad")
+        search.given = (*motions, bad)
+        search.split = replace(search.split, fitted=kept, waiting=(bad, *search.split.fitted[2:]))
+        assert bad in search.whole
+        search.admit(search.judged(Rope(MODEL.at(TRUE), STIFFNESS, TRUE)))
+        assert search.whole == motions and len(search.split.waiting) == 2
+        assert search.left_out == ["bad is left out of the fit: its prediction diverges"]
 
     def test_a_model_that_was_far_off_is_not_predicted_again(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        climb = Climb([shown(f"{k}") for k in range(5)], 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, lambda text: None)
+        climb = Climb(Search([shown(f"{k}") for k in range(5)], 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, lambda text: None))
         ropes = [Rope(MODEL.at(v), STIFFNESS, v) for v in ({"rope_EI": 0.031}, {"rope_EI": 0.0312}, {"rope_EI": 0.3})]
-        climb.rope, *climb.tried = [climb._judged(rope) for rope in ropes]
+        climb.rope, *climb.tried = [climb.search.judged(rope) for rope in ropes]
         judged: list[float] = []
-        again = Climb._judged
-        monkeypatch.setattr(Climb, "_judged", lambda self, r: judged.append(r.values["rope_EI"]) or again(self, r))
+        again = Search.judged
+        monkeypatch.setattr(Search, "judged", lambda self, r: judged.append(r.values["rope_EI"]) or again(self, r))
         climb.equal()
         assert judged == [0.031, 0.0312]
 
     def test_the_derivative_that_promised_is_the_first_of_the_fit(self, monkeypatch: pytest.MonkeyPatch) -> None:
         """It was made twice, which took a third of the time of a rung that was then fitted in three steps."""
         moved = {"rope_start_shift_1": 0.006, "rope_end_shift_2": -0.006}
-        climb = Climb(self.shifted(moved), 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, lambda text: None)
-        climb.rope = climb._judged(Rope(MODEL.at(TRUE), STIFFNESS, TRUE))
+        climb = Climb(Search(self.shifted(moved), 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, lambda text: None))
+        climb.rope = climb.search.judged(Rope(MODEL.at(TRUE), STIFFNESS, TRUE))
         at: list[bytes] = []
         evaluated = Evaluator.__call__
 

@@ -10,32 +10,33 @@ import numpy as np
 
 from ..errors import SheetbendError
 from ..minimum.problem import FitProblem
+from ..result.result import Start
 from .beside import Offsets, beside, frames_of, offsets_found
 from .first_order import first_order
 from .judging import BETTER, EQUAL, Split, Verdict, predict, verdict
 from .ladder import AND, Rung, together
 from .model import NAME, RopeModel
 from .motion import GrippedMotion
+from .search import LONG, Search
 from .steps import Parts, Rope, Step
-from .straight import LONG, SHORT, Say, Straight
-from .windows import Span
+from .straight import SHORT, straight
 
 NEAR = 1.5  # of the median error: models that were farther off cannot predict equally well
 FEW = 3  # derivatives, at most, of a rung that is nearly linear
 
 
-class Climb(Straight):
-    """A search on given recordings; `rope`, `steps` and `left_out` hold how far it has come.
+class Climb:
+    """A climb on the recordings of a search; `rope` and `steps` hold how far it has come.
 
     Attributes:
+        raced: the starts of the first rung, where they were raced.
+        tried: ropes of all rungs that did not diverge.
         beside: how far the markers sit beside the rope's axis, where the recordings were moved onto it.
-        equal: ropes of rungs that predict as well as the last one that stayed.
     """
 
-    def __init__(
-        self, motions: Sequence[GrippedMotion], share: float, windows: Sequence[Span], threads: int, say: Say
-    ) -> None:
-        super().__init__(motions, share, windows, threads, say)
+    def __init__(self, search: Search) -> None:
+        self.search = search
+        self.raced: tuple[Start, ...] = ()
         self.steps: list[Step] = []
         self.tried: list[Rope] = []
         self.rope: Rope | None = None
@@ -56,7 +57,7 @@ class Climb(Straight):
             starts: how many are raced; None = those of the bending lengths, one after the other.
         """
         began = time.perf_counter()
-        first = self._straight(models, ladder[0], bending_lengths, most_links, starts)
+        first, self.raced = straight(self.search, models, ladder[0], bending_lengths, most_links, starts)
         self._keep(ladder[0], first, None, began)
         stayed = [self._climbed(rung) for rung in ladder[1:]]
         last = max((k for k, stays in enumerate(stayed) if stays), default=-1)
@@ -73,7 +74,7 @@ class Climb(Straight):
             if rung.beside and self.beside:
                 self._climbed(rung)  # what the rope's shape had taken up of the offsets, and gave back since
         assert self.rope is not None
-        self._admit(self.rope)
+        self.search.admit(self.rope)
 
     def _climbed(self, rung: Rung) -> bool:
         """Try a rung; whether it stays."""
@@ -84,8 +85,8 @@ class Climb(Straight):
         larger, parameters = self._with(rung, self.rope)
         start = Rope(larger, parameters, self.rope.values)
         if rung.small:
-            problem = self._problem(start, self.longest)
-            told = first_order(problem, larger, start.values, self.split, self.threads)
+            problem = self.search.problem(start, self.search.longest)
+            told = first_order(problem, larger, start.values, self.search.split, self.search.threads)
             if told is not None and told.ratio >= BETTER:
                 return self._skip(rung, told, began)
             found = self._long(rung.name, start, FEW, problem)
@@ -96,28 +97,28 @@ class Climb(Straight):
 
     def _onto_axis(self, rung: Rung, rope: Rope, began: float) -> bool:
         """Try the recordings, moved onto the rope's axis; whether they stay there. What is fitted next follows them."""
-        given, split = self.given, self.split
+        given, split = self.search.given, self.search.split
         found, offsets = None, self._offsets(rope)
         if offsets is not None:
-            self.given, self.split = self._moved(rope, offsets)
-            found = self._judged(rope)
+            self.search.given, self.search.split = self._moved(rope, offsets)
+            found = self.search.judged(rope)
         told = None if found is None else verdict(found.errors, rope.errors)
         if told is not None and told.stays and offsets is not None:
             before = self.beside or ((0.0, 0.0),) * len(offsets)
             self.beside = tuple((a + c, b + d) for (a, b), (c, d) in zip(before, offsets, strict=True))
         else:
-            self.given, self.split = given, split
+            self.search.given, self.search.split = given, split
         self._keep(rung, found, told, began)
         return self.steps[-1].stays
 
     def _offsets(self, rope: Rope) -> Offsets | None:
         """Of the markers, from the axis; None where a motion diverges."""
-        motions = self.split.fitted
+        motions = self.search.split.fitted
         try:
             frames = [frames_of(rope.model, m, rope.values) for m in motions]
         except SheetbendError:
             return None
-        return offsets_found(motions, predict(rope.model, motions, rope.values, self.threads), frames)
+        return offsets_found(motions, predict(rope.model, motions, rope.values, self.search.threads), frames)
 
     def _put_back(self) -> None:
         """What is given and its split, with the markers where they were recorded."""
@@ -125,14 +126,17 @@ class Climb(Straight):
         def recorded(motion: GrippedMotion) -> GrippedMotion:
             return self._recorded.get(motion, motion)
 
-        self.given, self.beside = tuple(recorded(m) for m in self.given), ()
-        self.split = self.split.each(recorded)
+        self.search.given, self.beside = tuple(recorded(m) for m in self.search.given), ()
+        self.search.split = self.search.split.each(recorded)
 
     def _moved(self, rope: Rope, offsets: Offsets) -> tuple[tuple[GrippedMotion, ...], Split]:
         """What is given and its split, with the markers on the rope's axis."""
-        every = {m: m.moved(-beside(rope.model, m, rope.values, offsets)) for m in (*self.whole, *self.split.motions)}
+        every = {
+            m: m.moved(-beside(rope.model, m, rope.values, offsets))
+            for m in (*self.search.whole, *self.search.split.motions)
+        }
         self._recorded |= {moved: self._recorded.get(m, m) for m, moved in every.items()}
-        return tuple(every[m] for m in self.whole), self.split.each(every.__getitem__)
+        return tuple(every[m] for m in self.search.whole), self.search.split.each(every.__getitem__)
 
     def _reconsider(self, ladder: Sequence[Rung], late: Sequence[Rung]) -> None:
         """Take back offsets of grips and markers that stayed before a part of the rope itself did: they may have stood
@@ -143,12 +147,12 @@ class Climb(Straight):
         again = [r for r in ladder[since:] if r.offsets and (self.beside if r.beside else r.within(before.model))]
         if not again:
             return
-        kept, steps = (self.given, self.split, self.beside, self.left_out), self.steps
+        kept, steps = (self.search.given, self.search.split, self.beside, self.search.left_out), self.steps
         if self.beside:
             self._put_back()
         without, name = before, f"without {AND.join(rung.name for rung in again)}"
         for rung in again:
-            without = without.without(rung, self.split.fitted[0])
+            without = without.without(rung, self.search.split.fitted[0])
         smaller = self._long(name, without)
         if smaller is not None:
             gone = {rung.name for rung in again}
@@ -159,10 +163,10 @@ class Climb(Straight):
                 self._climbed(rung)
             if not verdict(before.errors, self.rope.errors).stays:
                 return
-            self.say("all offsets together predict better: they stay as they were")
+            self.search.say("all offsets together predict better: they stay as they were")
             self.steps = [*steps, *(replace(s, stays=False) for s in self.steps[len(steps) :])]
         self.rope = before
-        self.given, self.split, self.beside, self.left_out = kept
+        self.search.given, self.search.split, self.beside, self.search.left_out = kept
 
     def _skip(self, rung: Rung, told: Verdict, began: float) -> bool:
         """Note a rung that promises nothing; it does not stay."""
@@ -170,25 +174,19 @@ class Climb(Straight):
         fitted, others = self.rope.errors.typical
         seconds = time.perf_counter() - began
         self.steps.append(Step(rung.name, fitted, others, False, seconds, told.ratio, told.better, told.count))
-        self.say(f"{rung.name}: one step promises {told.ratio:.3g} times the errors without it, does not stay")
+        self.search.say(f"{rung.name}: one step promises {told.ratio:.3g} times the errors without it, does not stay")
         return False
 
     def _with(self, rung: Rung, rope: Rope) -> tuple[RopeModel, Parts]:
         """The rope's model and parameters, with what a rung adds."""
-        return rung.added_to(rope.model), (*rope.parameters, *rung.wanted(self.split.fitted[0]))
-
-    @property
-    def whole(self) -> list[GrippedMotion]:
-        """All motions that belong, uncut."""
-        kept = {id(m) for m in (*self.split.motions, *self.split.waiting)}
-        return [m for m in self.given if self.split.cut or id(m) in kept]
+        return rung.added_to(rope.model), (*rope.parameters, *rung.wanted(self.search.split.fitted[0]))
 
     def equal(self) -> list[Rope]:
         """What was tried and predicts as well as the rope that was found."""
         assert self.rope is not None
-        here = self._judged(self.rope).errors
+        here = self.search.judged(self.rope).errors
         near = [rope for rope in self.tried if rope.values is not self.rope.values and _near(rope, self.rope)]
-        others = [self._judged(rope) for rope in near]
+        others = [self.search.judged(rope) for rope in near]
         return [rope for rope in others if abs(verdict(rope.errors, here).ratio - 1.0) <= EQUAL]
 
     def _keep(self, rung: Rung, found: Rope | None, told: Verdict | None, began: float) -> None:
@@ -200,9 +198,9 @@ class Climb(Straight):
             if stays:
                 self.rope = found
         self._note(rung.name, found, told, stays, began)
-        if stays and not first and self.rope is not None and self._leave_out(self.rope.errors.whole):
+        if stays and not first and self.rope is not None and self.search.leave_out(self.rope.errors.whole):
             # the better the model, the clearer what does not belong; the next rung has to beat a fit without it
-            self.rope = self._judged(self._on(self.rope, self.longest))
+            self.rope = self.search.judged(self.search.fitted(self.rope, self.search.longest))
 
     def _note(self, name: str, found: Rope | None, told: Verdict | None, stays: bool, began: float) -> None:
         """Add a step, once it counts: who is told of it may stop there."""
@@ -215,12 +213,12 @@ class Climb(Straight):
 
     def _tell(self, step: Step) -> None:
         if not np.isfinite(step.others):
-            self.say(f"{step.name}: diverges, does not stay")
+            self.search.say(f"{step.name}: diverges, does not stay")
             return
         errors = f"{1e3 * step.fitted:.3g} mm, {1e3 * step.others:.3g} mm on others"
         if step.ratio is not None:
             errors += f", {step.ratio:.3g} times without it, better on {step.better} of {step.count}"
-        self.say(f"{step.name}: {errors}{'' if step.stays else ', does not stay'}")
+        self.search.say(f"{step.name}: {errors}{'' if step.stays else ', does not stay'}")
 
     def _tried(self, rung: Rung, rope: Rope) -> Rope | None:
         """A rope with a rung, fitted to middle windows from each of the rung's starts, and the best of these to long
@@ -229,7 +227,7 @@ class Climb(Straight):
         for start in ({}, *rung.starts):
             shifted = {f"{NAME}_{k}": v for k, v in start.items() if k != "EI"}
             shifted[f"{NAME}_EI"] = rope.values[f"{NAME}_EI"] * start.get("EI", 1.0)
-            found = self._descended(replace(rope, values={**rope.values, **shifted}), self.middle, SHORT)
+            found = self.search.descended(replace(rope, values={**rope.values, **shifted}), self.search.middle, SHORT)
             if found is not None:
                 ends.append(found)
         if not ends:
@@ -243,9 +241,9 @@ class Climb(Straight):
             problem: of these windows, where it was made (`_problem`) and has a derivative already.
         """
         try:
-            return self._judged(self._on(rope, self.longest, most, problem))
+            return self.search.judged(self.search.fitted(rope, self.search.longest, most, problem))
         except SheetbendError as error:
-            self.say(f"{name}: {error}")
+            self.search.say(f"{name}: {error}")
             return None
 
 

@@ -50,7 +50,7 @@ def conclude(
     Raises:
         SheetbendError: the motion diverges.
     """
-    rope, say, threads = climb.rope, climb.say, climb.threads
+    rope, say, threads = climb.rope, climb.search.say, climb.search.threads
     assert rope is not None
     experiments = experiments_of(rope.model, motions, window, rope.values)
     parameters = bounded(rope.parameters, rope.model, motions, window[0])
@@ -61,7 +61,7 @@ def conclude(
     if not interrupted:
         try:
             spread = model_spread(rope, climb.equal())
-            few = climb.windows[-1]
+            few = climb.search.windows[-1]
             if len(places(motions, few)) < len(experiments):  # most of the way at a part of the price
                 values = _at_the_end(climb, values, experiments_of(rope.model, motions, few, values), parameters)
             values = _at_the_end(climb, values, experiments, parameters, sure=False)  # `fit` goes on from there
@@ -107,10 +107,10 @@ def _at_the_end(
     Raises:
         SheetbendError: the motion diverges.
     """
-    found = descend(problem_of(experiments, parameters, values, climb.threads), MOST, sure=sure)
+    found = descend(problem_of(experiments, parameters, values, climb.search.threads), MOST, sure=sure)
     if not found.finite:
         raise SheetbendError("the fit that counts diverges where the last rung ended")
-    climb.say(f"{'ended' if found.ended else 'not ended'} after {found.iterations} steps")
+    climb.search.say(f"{'ended' if found.ended else 'not ended'} after {found.iterations} steps")
     return found.values
 
 

@@ -34,9 +34,9 @@ from .motion import Array, GrippedMotion, motions_of
 from .over_density import UNIT, as_quantities, named_over_density, over_density, said_over_density
 from .plausible import doubts, gravities
 from .screening import screened
+from .search import Say, Search
 from .start import started
 from .steps import Step
-from .straight import Say
 from .windows import SPANS, Span, everything
 
 BENDING_LENGTHS = (0.45, 0.25, 0.12)  # m, of the starts: (EI/(density g))^(1/3), stiff first
@@ -188,7 +188,7 @@ def fit_rope(
     if isinstance(windows, str):
         begun = started(model, motions, bending_lengths[0])
         say(announced(begun, ladder, motions, everything(motions, spans[-1][0]), threads))
-    climb, interrupted = Climb(motions, validate, spans, threads, say), False
+    climb, interrupted = Climb(Search(motions, validate, spans, threads, say)), False
     try:
         climb.run([replace(model, gravity=g) for g in meant], ladder, bending_lengths, max_segments, starts)
     except KeyboardInterrupt:
@@ -196,7 +196,7 @@ def fit_rope(
             raise
         interrupted = True
         say(f"interrupted: going back to {next(s.name for s in reversed(climb.steps) if s.stays)}")
-    kept = climb.whole
+    kept = climb.search.whole
     last = everything(kept, spans[-1][0]) if isinstance(windows, str) else spans[-1]
     sds = dict(given or {})
     if marker_mass is None:
@@ -210,7 +210,7 @@ def fit_rope(
         *usable.notes,
         *doubts(motions, rope.model.gravity),
         *_found_gravity(rope.model, meant),
-        *climb.left_out,
+        *climb.search.left_out,
         *at_bounds(rope.parameters, values, rope.model, kept, last[0]),
         *_short_links(rope.model, values),
     )
