@@ -52,7 +52,7 @@ def by_gauss_seidel(e: sb.Experiment, sweeps: int) -> sb.Experiment:
 
 
 def draped(config: Config) -> sb.Fit:
-    """The square alone, as a cloth of its own; Poisson's number, which it tells even less of, is known."""
+    """The square alone, as a cloth of its own; Poisson's ratio, which it tells even less of, is known."""
     (square,) = (cloth for cloth in config.scene.cloth if cloth.name == "square")
     (shown,) = (recording for recording in config.recording if recording.static)
     known = {"name": "cloth", "poisson": config.published["cloth_poisson"]}

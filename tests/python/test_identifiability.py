@@ -493,7 +493,7 @@ def test_an_axis_without_residuals_has_no_spectrum_of_its_own() -> None:
 
 
 def test_what_widens_an_interval_keeps_to_the_bounds():
-    """Poisson's number of 0.45 +- 0.1 with 0.2 of discretization ended at 0.75, where 0.5 is the most."""
+    """Poisson's ratio of 0.45 +- 0.1 with 0.2 of discretization ended at 0.75, where 0.5 is the most."""
     number = Parameter(name="nu", initial=0.3, lower=-0.5, upper=0.5)
     assert widened(number, 0.45, (0.35, 0.48), 0.2) == approx((0.15, 0.5))
     assert widened(number, -0.45, (-0.48, None), 0.2) == (approx(-0.5), None)

@@ -74,7 +74,7 @@ def test_frames_have_a_share_of_the_mass():
 
 
 def test_energy_of_an_even_strain():
-    """That of Young's modulus E and Poisson's number 0: E tr e^2/2, of any small strain of a cube; none of a turn."""
+    """That of Young's modulus E and Poisson's ratio 0: E tr e^2/2, of any small strain of a cube; none of a turn."""
     scene, solid = cube()
     strain = 1e-5 * np.array([[3.0, 1.0, -2.0], [1.0, -1.0, 0.5], [-2.0, 0.5, 2.0]])
     x = scene.nodes

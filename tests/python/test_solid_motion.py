@@ -99,7 +99,7 @@ TWIN_SOLVER = sb.Solver(h=4e-3, method="newton")
 
 
 def test_a_swinging_bar_is_identified():
-    """E, Poisson's number and damping from markers on its surface and one inside: the intervals hold the truth."""
+    """E, Poisson's ratio and damping from markers on its surface and one inside: the intervals hold the truth."""
     scene = bar()
     times = np.arange(0, 0.4, 0.008)
     solid = scene.solids["bar"]

@@ -119,7 +119,7 @@ def test_laws_agree_for_small_strains():
 
 
 def test_a_stretched_bar_is_identified():
-    """E and Poisson's number of a bar that falls along its length and swings, by strains of up to a third; with the
+    """E and Poisson's ratio of a bar that falls along its length and swings, by strains of up to a third; with the
     other law the markers are somewhere else."""
     solver, times, sigma = sb.Solver(h=4e-3, method="newton"), np.arange(0, 0.32, 0.008), 2e-4
     points = [[x, y, z] for x in (0.03, 0.06, 0.1) for y, z in ((0.0, 0.01), (0.01, 0.02), (0.02, 0.005))]

@@ -74,7 +74,7 @@ def test_uniaxial_tension(s):
 
 
 def test_derivatives_of_uniaxial_tension():
-    """By E the stretch falls as if the load fell; by Poisson's number as the closed form's differences."""
+    """By E the stretch falls as if the load fell; by Poisson's ratio as the closed form's differences."""
     s = 1.1
     rest = sb.equilibrium(pulled(stress(s)))
     cube = rest.scene.solids["solid"]

@@ -36,7 +36,7 @@ class SolidSection(Section):
     density: Finite = key(..., "mass per volume", "kg/m^3", gt=0)
     E: Finite = key(..., "Young's modulus", "Pa", gt=0)
     poisson: Finite | None = key(
-        None, "Poisson's number: 0.499 hardly changes its volume; left out with clusters", gt=-1, lt=0.5
+        None, "Poisson's ratio: 0.499 hardly changes its volume; left out with clusters", gt=-1, lt=0.5
     )
     clusters: Finite | None = key(
         None,

@@ -1,4 +1,4 @@
-"""Solids: meshes of bricks or tetrahedra, given and fitted by Young's modulus, Poisson's number and damping."""
+"""Solids: meshes of bricks or tetrahedra, given and fitted by Young's modulus, Poisson's ratio and damping."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def add_solid(
         density: kg/m^3.
         E: Young's modulus, Pa; of clusters one for all, or (clusters,), which are the quantities `<material>_E_0` and
             so on.
-        poisson: Poisson's number, above -1 and below 0.5.
+        poisson: Poisson's ratio, above -1 and below 0.5.
         orthotropic: a material that differs along three axes, instead of these two; it has no volume row.
         clusters: shape matching instead of elements: vertices of each cluster, which may share some, such as
             `cluster_boxes` gives. Each cluster is drawn to its own shape at rest, turned. `poisson` is left out.
@@ -212,7 +212,7 @@ def _checked_numbers(
     check_positive(name, {"E": E}, {})  # type: ignore[dict-item]
     if not (is_number(poisson) and -1 < poisson < 0.5):
         fix = "give one above -1 and below 0.5; 0.499 hardly changes its volume"
-        raise SceneError(f"{name}.poisson", "is no Poisson's number of a stable material", poisson, fix)
+        raise SceneError(f"{name}.poisson", "is no Poisson's ratio of a stable material", poisson, fix)
     by_row = poisson > 0 if volume_row is None else bool(volume_row)
     if rubber and not by_row:
         fix = 'give a positive poisson and no volume_row, or law = "strain"'

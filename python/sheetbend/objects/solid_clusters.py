@@ -4,7 +4,7 @@ where it fits best (Mueller, Heidelberger, Teschner & Gross 2005, ACM Trans. Gra
 A cluster has a frame, four nodes like those of a body: a center p and axes a_k that stay orthonormal. A vertex with the
 place X in the cluster at rest is drawn to p + X_k a_k, by the energy 3 E v |x - p - X_k a_k|^2/(2 R^2): v is its share
 of the cluster's volume V, and R^2 = sum v |X|^2/V. At rest the axes are the rotation of the polar decomposition of
-sum v x X'. A cluster of equal extents that strains evenly has Young's modulus E and Poisson's number 0.
+sum v x X'. A cluster of equal extents that strains evenly has Young's modulus E and Poisson's ratio 0.
 """
 
 from __future__ import annotations

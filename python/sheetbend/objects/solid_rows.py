@@ -58,7 +58,7 @@ class Orthotropic:
         n12, n13, n23 = self.poisson
         coupled = np.array([[1.0, -n12, -n13], [-n12, 1.0, -n23], [-n13, -n23, 1.0]])
         if not np.linalg.eigvalsh(coupled)[0] > 0:
-            fix = "give smaller couplings; an isotropic material has three times its Poisson's number, below 0.5"
+            fix = "give smaller couplings; an isotropic material has three times its Poisson's ratio, below 0.5"
             raise SceneError("orthotropic.poisson", "are of no stable material", list(self.poisson), fix)
         axes = finite("orthotropic.axes", self.axes, None, SceneError)
         if axes.shape[-2:] != (3, 3) or axes.ndim > 3:
