@@ -48,6 +48,24 @@ def open_estimate(
     )
 
 
+def closed_estimate(parameter: Parameter, value: float, lower: float, upper: float) -> Estimate:
+    """Of a parameter whose whole interval comes from the residuals, identified or weak."""
+    half = (upper - lower) / 2
+    verdict, words = known(parameter, value, lower, upper)
+    return Estimate(
+        name=parameter.name,
+        value=value,
+        unit=parameter.unit,
+        lower=lower,
+        upper=upper,
+        half_width=half,
+        statistical=half,
+        discretization=0.0,
+        verdict=verdict,
+        words=words,
+    )
+
+
 def ran_off(parameter: Parameter, value: float) -> bool:
     """Whether the fit moved a parameter many times its size away from its start."""
     start = parameter.initial
