@@ -21,7 +21,7 @@ from ..minimum.workers import shared_out
 from ..optional import require
 from ..quantities.parameters import Parameter, Parameters
 from ..report.many import ManyFit, OwnParameter
-from ..result.result import Estimate
+from ..result.estimate import Estimate
 from ..statistics.gauge import RANK_TOLERANCE, NullSpace, null_space
 from ..statistics.intervals import at_far_limit, clipped, closed_estimate, linear_ends, open_estimate
 from ..statistics.judge import LEVEL

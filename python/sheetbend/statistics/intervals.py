@@ -6,7 +6,7 @@ import math
 
 from ..quantities.parameters import Parameter
 from ..quantities.wording import width_words
-from ..result.result import Estimate
+from ..result.estimate import Estimate
 from .profile import FARTHEST, Ends
 
 IDENTIFIED = 0.2

@@ -18,7 +18,7 @@ from ..optional import require
 from ..quantities.parameters import Parameter, Parameters
 from ..quantities.wording import figures, short
 from ..report.tables import Section, plain_section
-from ..result.result import Estimate
+from ..result.estimate import Estimate
 from ..statistics.gauge import null_space
 from ..statistics.intervals import NORMAL, closed_estimate, open_estimate
 from .reading import Reading
