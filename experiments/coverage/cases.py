@@ -11,7 +11,7 @@ import numpy as np
 import sheetbend as sb
 from sheetbend import textile
 from sheetbend.minimum.problem import FitProblem, as_parameters
-from sheetbend.result.result import Estimate
+from sheetbend.result.estimate import Estimate
 
 SIGMA = 3e-3  # m
 ALIKE = 0.8  # correlation of neighboring frames

@@ -11,7 +11,7 @@ from functools import cache
 
 import numpy as np
 import sheetbend as sb
-from sheetbend.result.result import Estimate
+from sheetbend.result.estimate import Estimate
 
 SIGMA = 1e-3  # m
 FORCE_SIGMA = 0.01  # N

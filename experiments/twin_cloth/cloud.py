@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 import sheetbend as sb
 from make_data import HAMMOCK, KNOWN, SWINGING, TRUE, Piece, bars
-from sheetbend.result.result import Estimate
+from sheetbend.result.estimate import Estimate
 
 Array = np.ndarray
 PIECES = {name: SWINGING[name] for name in ("cloth", "bias_cut")}

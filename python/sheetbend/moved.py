@@ -63,9 +63,9 @@ CONTENTS = {
         "report.report": "sections headline plain rich_report",
     },
     "result": {
-        "result.result": (
-            "UNSOUND VERDICTS Estimate Given Premise Correlation RecordingFit ForceFit Misfit Start Refit MotionGrowth"
-        ),
+        "result.estimate": "UNSOUND VERDICTS Estimate Given Premise Correlation",
+        "result.motions": "RecordingFit ForceFit MotionGrowth",
+        "result.result": "Misfit Start Refit",
         "report.fit_result": "FORMAT FitResult",
     },
     "scene": {

@@ -11,7 +11,8 @@ from sheetbend.experiment.carried import carried_baselines
 from sheetbend.experiment.clock import lateness, outside, told_clocks
 from sheetbend.fitting.fitted_motion import fitted_positions
 from sheetbend.recording.baseline import baseline
-from sheetbend.result.result import Estimate, RecordingFit
+from sheetbend.result.estimate import Estimate
+from sheetbend.result.motions import RecordingFit
 
 Array = np.ndarray
 T = np.linspace(0.0, 1.0, 41)

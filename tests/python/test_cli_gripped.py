@@ -22,7 +22,7 @@ from sheetbend.config import GrippedConfig, gripped_schema, parse, parse_any
 from sheetbend.gripped import LADDER, GrippedMotion, trades
 from sheetbend.gripped.ladder import BESIDE, MARKERS, REST, SHIFTS, TILTS, TWIST, VARYING, YIELD
 from sheetbend.report.fit_result import FitResult
-from sheetbend.result.result import Correlation, Estimate
+from sheetbend.result.estimate import Correlation, Estimate
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "gripped_ropes"
 ROPE = """\

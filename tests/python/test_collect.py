@@ -14,7 +14,7 @@ from commands import last_line, run
 from sheetbend.errors import InputError
 from sheetbend.report.collected import Collected
 from sheetbend.report.fit_result import FitResult
-from sheetbend.result.result import Estimate
+from sheetbend.result.estimate import Estimate
 from sheetbend.statistics.population import population
 
 # --- populations

@@ -16,7 +16,7 @@ from sheetbend.minimum.optimizers import minimize
 from sheetbend.minimum.problem import FitProblem, as_parameters
 from sheetbend.minimum.time_step import settle
 from sheetbend.quantities.parameters import Parameter, Parameters
-from sheetbend.result.result import Estimate
+from sheetbend.result.estimate import Estimate
 
 TRUE = {"warp": 60.0, "weft": 40.0, "shear": 12.0}
 WANTED = ["cloth_warp", "cloth_shear", "cloth_bending", "cloth_drag_linear"]

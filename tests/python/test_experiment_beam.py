@@ -16,7 +16,7 @@ from sheetbend.config import load
 from sheetbend.doubts.prediction import Comparison
 from sheetbend.fitting.fit import Fit
 from sheetbend.minimum.problem import FitProblem
-from sheetbend.result.result import RecordingFit
+from sheetbend.result.motions import RecordingFit
 from sheetbend.statistics.covariance import covariance
 
 BEAM = Path(__file__).resolve().parents[2] / "experiments" / "beam" / "beam.toml"

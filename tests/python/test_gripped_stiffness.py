@@ -13,7 +13,7 @@ from sheetbend.gripped.judging import predict
 from sheetbend.gripped.report import counted
 from sheetbend.gripped.stiffness import stiffness_section, tangent_stiffness
 from sheetbend.report.fit_result import FitResult
-from sheetbend.result.result import Correlation, Estimate
+from sheetbend.result.estimate import Correlation, Estimate
 from test_cli_gripped import result_of
 from test_gripped_motion import carried_about, model_of
 

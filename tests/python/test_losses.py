@@ -9,7 +9,7 @@ import pytest
 import sheetbend as sb
 from sheetbend.doubts.losses import air_doubts, loss_sum
 from sheetbend.minimum.problem import FitProblem, as_parameters
-from sheetbend.result.result import Estimate
+from sheetbend.result.estimate import Estimate
 
 TRUE = {"strip_bend_damping": 4e-3, "strip_drag_linear": 0.16}
 LENGTH, CLAMP, NOISE = 0.4, 0.4 / 12, 2e-3  # m

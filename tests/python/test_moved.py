@@ -19,7 +19,8 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.moved import CONTENTS, MODULES, RENAMED
-from sheetbend.result.result import Estimate, RecordingFit
+from sheetbend.result.estimate import Estimate
+from sheetbend.result.motions import RecordingFit
 
 NOW = {f"sheetbend.{n}": f"sheetbend.{package}.{n}" for package, names in MODULES.items() for n in names.split()}
 HELD = {

@@ -24,7 +24,7 @@ from sheetbend.page import Shown, fit_page, motion_page, of_recording, of_trajec
 from sheetbend.page.packed import MISSING, packed_motions
 from sheetbend.report.fit_result import FitResult
 from sheetbend.report.report import sections
-from sheetbend.result.result import Correlation
+from sheetbend.result.estimate import Correlation
 from typer.testing import CliRunner
 
 pytest.importorskip("jinja2")

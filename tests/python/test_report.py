@@ -20,7 +20,9 @@ from sheetbend.optional import MissingExtraError, require
 from sheetbend.quantities.wording import short
 from sheetbend.report.fit_result import FitResult
 from sheetbend.report.report import figures, plain, rich_report
-from sheetbend.result.result import Correlation, Estimate, Given, RecordingFit, Start
+from sheetbend.result.estimate import Correlation, Estimate, Given
+from sheetbend.result.motions import RecordingFit
+from sheetbend.result.result import Start
 
 GAUGE = "rope_density^+1 * rope_EA^+1 stays free: only the ratio rope_EA/rope_density is known"
 

@@ -17,7 +17,7 @@ from sheetbend.doubts.stationary import no_minimum
 from sheetbend.minimum.optimizers import Minimum
 from sheetbend.minimum.problem import FitProblem, as_parameters
 from sheetbend.objects.arm import add_arm
-from sheetbend.result.result import UNSOUND
+from sheetbend.result.estimate import UNSOUND
 from sheetbend.statistics.identifiability import Identifiability
 
 SOLVER = sb.Solver(h=1 / 400)

@@ -15,11 +15,13 @@ from sheetbend.cli.app import app
 from sheetbend.config import parse, scene_alone
 from sheetbend.errors import ConfigError, InputError, RecordingError
 from sheetbend.objects.laws import Exponential
+from sheetbend.textile.drape import Plates
 from sheetbend.textile.laboratory import bias_pulled, draped, extensions
 from sheetbend.textile.whole_fabric import FabricTests, supported_law
 from typer.testing import CliRunner, Result
 
 LENGTH, WIDTH = 0.2, 0.05  # m
+PLATES: Plates = {"diameter": 0.3, "plate": 0.18, "friction": None, "cover": True}
 
 
 def pull(path: Path, stiffness: float, b: float, share: float, reach: float = 0.06) -> str:
@@ -209,7 +211,7 @@ class TestOutlines:
 
     def test_a_drape_is_a_reading_of_the_state_with_as_many_folds(self) -> None:
         fabric = sb.Fabric(density=0.2, warp=600.0, shear=30.0, bending=3e-5)
-        reading = draped([textile.Outline("a", wavy()), textile.Outline("b", wavy(5, 0.129))], 0.3, 0.18)
+        reading = draped([textile.Outline("a", wavy()), textile.Outline("b", wavy(5, 0.129))], PLATES)
         assert reading.sigma > 3.0 and "5 folds" in reading.note
         own = reading.test(fabric)
         assert own.laboratory == textile.drape(fabric, folds=(5,)).coefficient.laboratory
@@ -218,7 +220,7 @@ class TestOutlines:
     def test_a_drape_may_touch_its_plate_instead(self) -> None:
         fabric = sb.Fabric(density=0.2, warp=600.0, shear=30.0, bending=3e-5)
         outlines = [textile.Outline("a", wavy())]
-        held, touching = draped(outlines, 0.3, 0.18), draped(outlines, 0.3, 0.18, friction=0.3, cover=False)
+        held, touching = draped(outlines, PLATES), draped(outlines, {**PLATES, "friction": 0.3, "cover": False})
         lower = held.test(fabric).laboratory - touching.test(fabric).laboratory
         assert 1.0 < lower < 3.0
 

@@ -24,7 +24,8 @@ app = typer.Typer(
     name="sheetbend",
     help="Simulate ropes, beams and cloth, and fit their physical parameters to recordings, with error bars.",
     epilog="Exit codes: 0 done, 2 bad input, 3 not identifiable, 4 did not converge or is doubtful, 5 a check failed, "
-    "130 and 143 stopped by Ctrl-C and SIGTERM.",
+    "130 stopped by Ctrl-C, 143 stopped by SIGTERM.",
+    rich_markup_mode="markdown",  # joins the lines of a docstring's paragraph
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )

@@ -33,16 +33,14 @@ SECONDS, LEAST = 40.0, 5.0  # about what the gradients of all scenes together ma
 
 
 def check(
-    config: Annotated[
-        Path, typer.Argument(help="A TOML configuration, see docs/configuration.md.", show_default=False)
-    ],
+    config: Annotated[Path, typer.Argument(help="A TOML configuration (docs/configuration.md).", show_default=False)],
     json: Json = False,
 ) -> None:
     """Compare the gradients of a scene with independent ones.
 
-    Checks every recording's scene over a short part of the motion, and the Jacobian of the residuals. Exits with 5 if a
-    check fails. Of a large scene only a sample is checked; the output lists it. Also prints how far small displacements
-    grow along each fitted motion.
+    Checks the scene of every recording over a short part of the motion, and the Jacobian of the residuals. Exits with 5
+    if a check fails. In a large scene only a sample is checked; the output lists it. Also prints by which factor small
+    displacements grow along each fitted motion.
 
     Example: sheetbend check experiments/twin/twin.toml
     """

@@ -25,7 +25,10 @@ FILES = ("fits.csv", "parameters.tsv", "population.json", "population.txt", "for
 
 def collect(
     results: Annotated[
-        list[Path], typer.Argument(help="Folders of fits, or folders of such folders, or fit.json.", show_default=False)
+        list[Path],
+        typer.Argument(
+            help="Output folders of fits, folders that contain such folders, or fit.json files.", show_default=False
+        ),
     ],
     output: Annotated[Path, typer.Option(help="Folder for the tables and the forest plot.")] = Path("out/collected"),
     json: Json = False,

@@ -30,11 +30,11 @@ _TONES = (GRAY, ACCENT, WARM, INK)
 def compare(
     fits: Annotated[
         list[Path],
-        typer.Argument(help="Folders that `sheetbend fit` has written; the first is what others are compared with."),
+        typer.Argument(help="Output folders of `sheetbend fit`. The others are compared with the first."),
     ],
     output: Annotated[
         Path | None,
-        typer.Option(help="Folder for compare.txt and compare.png; nothing is written when left out."),
+        typer.Option(help="Folder for compare.txt and compare.png. Default: nothing is written."),
     ] = None,
     json: Json = False,
 ) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 from ..quantities.wording import figures, short
 from ..report.tables import Section
-from ..result.result import Estimate
+from ..result.estimate import Estimate
 from ..statistics.paired import FEWEST, Paired
 from .compared import Written
 

@@ -28,12 +28,12 @@ FILES = ("fabric.toml", "report.txt", "report.html", *PICTURES)
 def fabric(
     file: Annotated[
         Path,
-        typer.Argument(help="A TOML file that names the laboratory's tests, see docs/fabric.md.", show_default=False),
+        typer.Argument(help="A TOML file that lists the tests of the laboratory (docs/fabric.md).", show_default=False),
     ],
     output: Annotated[
         Path | None,
         typer.Option(
-            help="Folder for fabric.toml, which scenes can name, report and figures; out/NAME when left out.",
+            help="Folder for the report, the figures and fabric.toml, which scenes can use. Default: out/NAME.",
             show_default=False,
         ),
     ] = None,

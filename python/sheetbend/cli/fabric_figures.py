@@ -12,7 +12,8 @@ from ..motion.equilibrium import Equilibrium
 from ..optional import MissingExtraError, require
 from ..pictures import plotting
 from ..pictures.drawing import ACCENT, GRAY, PALE, clean, key, panels_in
-from ..textile import WholeFabric, drape, mean_curve
+from ..textile import WholeFabric, mean_curve
+from ..textile.laboratory import as_draped
 from ..textile.shadow import shadow
 from .textile_figure import write_figure
 
@@ -40,16 +41,7 @@ def draped_rest(study: FabricStudy, found: WholeFabric) -> Equilibrium:
     """The state of the fitted fabric with as many folds as the outlines have."""
     sizes = study.config.drape
     assert sizes is not None  # what sent it here
-    folds = round(float(np.median([outline.nodes for outline in study.outlines])))
-    found_drape = drape(
-        found.fit.fabric,
-        diameter=sizes.diameter,
-        plate=sizes.plate,
-        folds=(folds,),
-        friction=sizes.friction,
-        cover=sizes.cover,
-    )
-    return found_drape.states[0].rest
+    return as_draped(found.fit.fabric, study.outlines, sizes.plates()).rest
 
 
 def _draw_drape(study: FabricStudy, found: WholeFabric, path: Path) -> None:

@@ -46,7 +46,7 @@ def fit(
     config: Annotated[
         Path,
         typer.Argument(
-            help="A TOML configuration (docs/configuration.md), or a pattern such as 'ropes/*.toml'.",
+            help="A TOML configuration (docs/configuration.md), or a pattern for several, such as 'ropes/*.toml'.",
             show_default=False,
         ),
     ],
@@ -54,7 +54,7 @@ def fit(
     output: Annotated[
         Path | None,
         typer.Option(
-            help="Folder for fit.json, report.html, report.txt, figures and fitted.toml; out/NAME when left out.",
+            help="Folder for fit.json, report.html, report.txt, figures and fitted.toml. Default: out/NAME.",
             show_default=False,
         ),
     ] = None,
@@ -64,23 +64,24 @@ def fit(
     resume: Annotated[
         bool,
         typer.Option(
-            "--resume", help="Go on with a fit that was killed or stopped, from the journal in its output folder."
+            "--resume", help="Continue a fit that was killed or stopped, from the journal in its output folder."
         ),
     ] = False,
     movie: MoviePath = None,
     workers: Annotated[
-        int, typer.Option(min=1, help="Processes that share out recordings, raced starts and leave-one-out.")
+        int, typer.Option(min=1, help="Number of processes that evaluate recordings, starts and leave-one-out fits.")
     ] = 1,
     dask: Annotated[
         str | None,
         typer.Option(
             metavar="ADDRESS",
-            help="Share out to the workers of a Dask scheduler, given its address or file (docs/cluster.md).",
+            help="Use the workers of a Dask scheduler, given by its address or file (docs/cluster.md).",
             show_default=False,
         ),
     ] = None,
     strict: Annotated[
-        bool, typer.Option("--strict", help="Exit 3 when any parameter is not identifiable, not only when all are.")
+        bool,
+        typer.Option("--strict", help="Exit with 3 if any parameter is not identifiable. Default: only if all are."),
     ] = False,
     json: Json = False,
 ) -> None:

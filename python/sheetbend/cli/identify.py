@@ -33,35 +33,39 @@ HUNG = "hung_by_the_plan"
 
 def identify(
     config: Annotated[
-        Path, typer.Argument(help="A TOML configuration; its recordings need not exist yet.", show_default=False)
+        Path, typer.Argument(help="A TOML configuration. Its recordings need not exist yet.", show_default=False)
     ],
     noise: Annotated[
         float | None,
-        typer.Option(help="Noise of a marker, m; the recordings' sigma when left out.", show_default=False),
+        typer.Option(
+            help="Standard deviation of the noise of a marker in m. Default: the recordings' sigma.", show_default=False
+        ),
     ] = None,
     autocorrelation: Annotated[
-        float, typer.Option(help="Correlation of a marker's errors from one frame to the next.")
+        float, typer.Option(help="Correlation of the errors of a marker between one frame and the next.")
     ] = 0.0,
-    duration: Annotated[float, typer.Option(help="s, of a motion that has no recording yet.")] = 1.0,
-    rate: Annotated[float, typer.Option(help="Frames per second of a motion that has no recording yet.")] = 100.0,
+    duration: Annotated[float, typer.Option(help="Duration in s of a motion that is not recorded yet.")] = 1.0,
+    rate: Annotated[float, typer.Option(help="Frames per second of a motion that is not recorded yet.")] = 100.0,
     markers: Annotated[
-        int, typer.Option(help="Markers along the rope, if there is neither a recording nor a marker table.")
+        int, typer.Option(help="Number of markers along the rope, if there is no recording and no marker table.")
     ] = MARKERS,
     other: Annotated[
         list[Path] | None,
         typer.Option(
-            "--with", help="Compare with a plan that has this configuration's motions too.", show_default=False
+            "--with",
+            help="Compare with a plan that also contains the motions of this configuration.",
+            show_default=False,
         ),
     ] = None,
     output: Annotated[
-        Path | None, typer.Option(help="Folder for plan.json; nothing is written when left out.", show_default=False)
+        Path | None, typer.Option(help="Folder for plan.json. Default: nothing is written.", show_default=False)
     ] = None,
     json: Json = False,
 ) -> None:
     """Predict, before an experiment, which parameters it will determine and how well.
 
-    Prints the expected intervals and verdicts, the combinations of parameters that stay free, and what one more marker,
-    mass, force sensor or motion would change. The prediction is made at the initial values of the parameters.
+    Prints the expected intervals and verdicts, the combinations of parameters that the data will not determine, and the
+    effect of one more marker, mass, force sensor or motion. The prediction uses the initial values of the parameters.
 
     Example: sheetbend identify rope.toml --noise 0.0005
     """

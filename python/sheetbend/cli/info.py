@@ -37,13 +37,13 @@ def info(
     config: Annotated[
         Path | None,
         typer.Argument(
-            help="A TOML configuration, see docs/configuration.md, or a recording: a file or a folder of meshes.",
+            help="A recording (a file, or a folder of meshes), or a TOML configuration (docs/configuration.md).",
             show_default=False,
         ),
     ] = None,
     json: Json = False,
 ) -> None:
-    """Show what a recording or a configuration holds, and which versions are installed.
+    """Show what a recording or a configuration contains, and which versions are installed.
 
     Prints the versions and what this build contains. With a recording, also what it holds and where each marker is
     first seen. With a configuration, also its scenes, quantities and parameters.

@@ -19,8 +19,8 @@ MoviePath = Annotated[
     Path | None,
     typer.Option(
         OPTION,
-        help="Also write a moving picture (GIF or MP4) of cloths, colored by strain, and ropes; a fit's with the "
-        "measured markers. Several recordings: one file each, FILE_NAME.gif or .mp4.",
+        help="Also write a GIF or MP4 movie of ropes and of cloths, colored by strain; the movie of a fit also shows "
+        "the measured markers. With several recordings, one file for each: FILE_NAME.gif or .mp4.",
         show_default=False,
     ),
 ]

@@ -44,36 +44,39 @@ def new(
     files: Annotated[
         list[Path],
         typer.Argument(
-            help="A recording, or several of the same rope or cloth; or the mesh of a garment (OBJ, PLY, STL).",
+            help="One recording, several recordings of the same rope or cloth, or a mesh of a garment (OBJ, PLY, STL).",
             show_default=False,
         ),
     ],
     output: Annotated[
         Path | None,
         typer.Option(
-            help="The configuration to write. Default: NAME.toml in the working directory.", show_default=False
+            help="The configuration file to write. Default: NAME.toml in the working directory.", show_default=False
         ),
     ] = None,
     density: Annotated[
         float | None,
-        typer.Option(help="Measured density: kg/m of a rope or beam, kg/m^2 of a cloth.", show_default=False),
+        typer.Option(help="Measured density in kg/m (rope, beam) or kg/m^2 (cloth).", show_default=False),
     ] = None,
     length: Annotated[
-        float | None, typer.Option(help="Measured length of a rope or beam, m.", show_default=False)
+        float | None, typer.Option(help="Measured length of the rope or beam in m.", show_default=False)
     ] = None,
     units: Annotated[
         str | None, typer.Option(help="Length unit of the files: m, cm or mm.", show_default=False)
     ] = None,
     poses: Annotated[
         Path | None,
-        typer.Option(help="Poses of the robot's tool that holds a cloth: time,x,y,z,qx,qy,qz,qw.", show_default=False),
+        typer.Option(
+            help="CSV file with the poses of the robot's tool that holds a cloth: time,x,y,z,qx,qy,qz,qw.",
+            show_default=False,
+        ),
     ] = None,
     json: Json = False,
 ) -> None:
     """Look at a recording and write a configuration for `sheetbend fit`.
 
-    Comments in the configuration say what the recording shows and what it cannot show. From the mesh of a garment it
-    writes a scene for `sheetbend simulate`.
+    Comments in the configuration explain what the recording shows and what it cannot show. For the mesh of a garment,
+    the command writes a scene for `sheetbend simulate`.
 
     Example: sheetbend new take.csv --density 0.05
     """

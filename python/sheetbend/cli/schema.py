@@ -22,10 +22,12 @@ def schema(
     kind: Annotated[
         Kind,
         typer.Argument(
-            help="A configuration with a scene, one of ropes between grips, a file of `sheetbend fabric`, or fit.json."
+            help="scene or ropes (between grips): a configuration; fabric: a file of `sheetbend fabric`; fit: fit.json."
         ),
     ] = "scene",
-    output: Annotated[Path | None, typer.Option(help="A file; printed when left out.", show_default=False)] = None,
+    output: Annotated[
+        Path | None, typer.Option(help="The file to write. Default: the schema is printed.", show_default=False)
+    ] = None,
 ) -> None:
     """Print the JSON schema of a file, with which editors complete and check keys.
 

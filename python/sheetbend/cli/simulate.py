@@ -59,22 +59,25 @@ def simulate(
     config: Annotated[
         Path,
         typer.Argument(
-            help="A TOML configuration, see docs/configuration.md; a fit's fitted.toml too.",
+            help="A TOML configuration (docs/configuration.md), or the fitted.toml of a fit.",
             show_default=False,
         ),
     ],
     output: Annotated[
-        Path | None, typer.Option(help="Folder for the trajectories; out/NAME when left out.", show_default=False)
+        Path | None, typer.Option(help="Folder for the trajectories. Default: out/NAME.", show_default=False)
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(help="s; to the recording's end when left out.", show_default=False)
+        float | None, typer.Option(help="Duration in s. Default: until the end of the recording.", show_default=False)
     ] = None,
-    recording: Annotated[str | None, typer.Option(help="Only the scene of this recording.", show_default=False)] = None,
+    recording: Annotated[
+        str | None, typer.Option(help="Name of a recording; only its scene is simulated.", show_default=False)
+    ] = None,
     mesh: Annotated[
         MeshFormat | None,
         typer.Option(
-            help="Also write every cloth: a folder of OBJ or PLY files, one per frame, or a PLY of the last frame with "
-            "strains and energy per triangle; or cloths and ropes over time in one file, glTF (.glb) or USD.",
+            help="Also write meshes. obj, ply-sequence: each cloth as a folder with one file per frame. ply: each "
+            "cloth in the last frame, with strain and energy of each triangle. gltf, usd: one file with the motion of "
+            "all cloths and ropes.",
             show_default=False,
         ),
     ] = None,
@@ -83,9 +86,9 @@ def simulate(
 ) -> None:
     """Simulate a scene without fitting, and write its motion.
 
-    The NPZ holds times, positions, velocities, forces of the constraints, pressures of kept volumes, and readings of
-    force sensors (sensor_NAME_times, _forces, _torques). If the scene has a recording, predicted_NAME.npz holds the
-    simulated markers.
+    The NPZ file contains times, positions, velocities, forces of the constraints, pressures of enclosed volumes, and
+    readings of force sensors (sensor_NAME_times, _forces, _torques). If the scene has a recording, predicted_NAME.npz
+    contains the simulated markers.
 
     Example: sheetbend simulate experiments/twin/twin.toml --output out/twin --movie motion.gif
     """

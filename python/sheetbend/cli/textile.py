@@ -31,49 +31,68 @@ Form = Literal["png", "svg", "pdf", "none"]
 
 def textile(
     files: Annotated[
-        list[Path], typer.Argument(help="Text exports (CSV, TXT), a specimen or several in each.", show_default=False)
+        list[Path],
+        typer.Argument(
+            help="Text files of a testing machine (CSV, TXT), each with one or more specimens.", show_default=False
+        ),
     ],
-    test: Annotated[Test, typer.Option(help="What the machine did.")] = "tension",
+    test: Annotated[Test, typer.Option(help="Type of the test.")] = "tension",
     length: Annotated[
         str | None,
-        typer.Option(help="Between the jaws: 20cm, or the words before it in the preamble.", show_default=False),
+        typer.Option(
+            help="Length between the jaws, such as 20cm, or the words before it in the head of the file.",
+            show_default=False,
+        ),
     ] = None,
     width: Annotated[
-        str | None, typer.Option(help="Of the specimen: 5cm, or the preamble's words.", show_default=False)
+        str | None,
+        typer.Option(
+            help="Width of the specimen, such as 5cm, or the words before it in the head of the file.",
+            show_default=False,
+        ),
     ] = None,
     column: Annotated[
         list[str] | None,
-        typer.Option(help="ROLE=NAME or ROLE=NUMBER; deformation, load, time, repeat.", show_default=False),
+        typer.Option(
+            help="Column of a role, as ROLE=NAME or ROLE=NUMBER. Roles: deformation, load, time, repeat.",
+            show_default=False,
+        ),
     ] = None,
     unit: Annotated[
-        list[str] | None, typer.Option(help="ROLE=UNIT where the header has none: load=cN.", show_default=False)
+        list[str] | None,
+        typer.Option(
+            help="Unit of a role, as ROLE=UNIT, if the file does not give it. Example: load=cN.", show_default=False
+        ),
     ] = None,
     decimal: Annotated[str | None, typer.Option(help="Decimal mark: a point or a comma.", show_default=False)] = None,
     pretension: Annotated[
-        str | None, typer.Option(help="Load at which strains are zero: 2N, or 1cN/cm.", show_default=False)
+        str | None,
+        typer.Option(help="Load at which the strain is taken as zero, such as 2N or 1cN/cm.", show_default=False),
     ] = None,
-    along: Annotated[Along, typer.Option(help="Direction of a pull.")] = "warp",
-    law: Annotated[LawName, typer.Option(help="Fitted to a pull.")] = "exponential",
+    along: Annotated[Along, typer.Option(help="Direction of the tension test.")] = "warp",
+    law: Annotated[LawName, typer.Option(help="Law that is fitted to a tension test.")] = "exponential",
     weights: Annotated[
         str,
         typer.Option(
-            help="Weight of small loads in the fit of a pull: a power of the load (0: all alike), or 'chosen'."
+            help="Weight of small loads in a fit of tension: a power of the load (0: equal weights), or 'chosen'."
         ),
     ] = "0",
     forecast: Annotated[
-        bool, typer.Option("--forecast", help="Extrapolate a pull to 1/0.6 times its strain, with an interval.")
+        bool, typer.Option("--forecast", help="Extrapolate a tension test to 1/0.6 times its strain, with an interval.")
     ] = False,
-    poisson: Annotated[float, typer.Option(help="sqrt(nu_uv nu_vu) of the fabric, where it is known.")] = 0.0,
-    way: Annotated[Way, typer.Option(help="Which way of the loop the elastic law follows.")] = "loading",
-    cycle: Annotated[int, typer.Option(help="Which one, from 0; -1 is the last.")] = 0,
+    poisson: Annotated[float, typer.Option(help="sqrt(nu_uv nu_vu) of the fabric, if it is known.")] = 0.0,
+    way: Annotated[Way, typer.Option(help="Part of the loop that the elastic law follows.")] = "loading",
+    cycle: Annotated[int, typer.Option(help="Number of the cycle, from 0; -1 is the last.")] = 0,
     output: Annotated[
         Path | None,
-        typer.Option(help="Folder for report, mean and figure; out/NAME when left out.", show_default=False),
+        typer.Option(
+            help="Folder for the report, the mean curve and the figure. Default: out/NAME.", show_default=False
+        ),
     ] = None,
     figures: Annotated[Form, typer.Option(help="Format of the figure.")] = "png",
     json: Json = False,
 ) -> None:
-    """Read a testing machine's curves, print their KES numbers, and fit the law of a pull with intervals.
+    """Read curves of a testing machine, print their KES values, and fit a law of tension with intervals.
 
     Example: sheetbend textile strips.csv --length 20cm --width 5cm --law chosen
     """

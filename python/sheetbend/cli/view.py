@@ -28,15 +28,15 @@ def view(
     file: Annotated[
         Path,
         typer.Argument(
-            help="A TOML configuration, whose scenes are simulated at their starting values, or a recording.",
+            help="A recording, or a TOML configuration, whose scenes are simulated at their starting values.",
             show_default=False,
         ),
     ],
     output: Annotated[
-        Path | None, typer.Option(help="The page; out/NAME.html when left out.", show_default=False)
+        Path | None, typer.Option(help="The HTML file to write. Default: out/NAME.html.", show_default=False)
     ] = None,
     units: Annotated[
-        str | None, typer.Option(help="Length unit of a recording: m, cm or mm.", show_default=False)
+        str | None, typer.Option(help="Length unit of the recording: m, cm or mm.", show_default=False)
     ] = None,
     json: Json = False,
 ) -> None:

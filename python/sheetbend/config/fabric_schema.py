@@ -6,6 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from ..textile.drape import Plates
 from .section import Finite, Name, Section, key
 
 Positive = Annotated[Finite, Field(gt=0)]
@@ -96,6 +97,9 @@ class DrapeTest(Section):
         if not self.cover and self.friction is None:
             raise ValueError("has no cover and no friction|give the friction of the plate too, or leave out cover")
         return self
+
+    def plates(self) -> Plates:
+        return {"diameter": self.diameter, "plate": self.plate, "friction": self.friction, "cover": self.cover}
 
 
 class Given(Section):

@@ -70,7 +70,7 @@ def load_fabric_tests(path: str | Path) -> FabricStudy:
     if config.drape is not None:
         with _at("drape"):
             of = config.drape
-            readings["drape"] = [draped(outlines, of.diameter, of.plate, of.error, of.friction, of.cover)]
+            readings["drape"] = [draped(outlines, of.plates(), of.error)]
     straight = [p for p in config.pull if p.along != "bias"]
     ways = {(p.way, p.cycle) for p in straight}
     if len(ways) > 1:

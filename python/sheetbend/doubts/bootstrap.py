@@ -24,7 +24,7 @@ from ..minimum.workers import Common
 from ..quantities.parameters import Parameters
 from ..quantities.wording import short
 from ..result.bootstrap import Bootstrap, BootstrapInterval
-from ..result.result import Estimate
+from ..result.estimate import Estimate
 
 FEWEST_DRAWS = 50
 FEWEST = 8  # recordings or stretches: fewer do not show a scatter

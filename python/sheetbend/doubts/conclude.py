@@ -14,7 +14,8 @@ from ..minimum.optimizers import Minimum
 from ..minimum.problem import FitProblem
 from ..quantities.parameters import Parameters
 from ..quantities.wording import short
-from ..result.result import UNSOUND, Estimate, Misfit
+from ..result.estimate import UNSOUND, Estimate
+from ..result.result import Misfit
 from ..statistics.identifiability import Identifiability, identify
 from ..statistics.intervals import open_estimate, ran_off
 from ..statistics.judge import Nuisance

@@ -15,7 +15,8 @@ from ..minimum.problem import FitProblem
 from ..minimum.time_step import SECOND_ORDER, halved
 from ..quantities.parameters import Parameter
 from ..quantities.wording import figures, short
-from ..result.result import UNSOUND, Estimate, RecordingFit
+from ..result.estimate import UNSOUND, Estimate
+from ..result.motions import RecordingFit
 from ..statistics.blocks import FEWEST, MOST_COLUMNS, Difference, Split, contradiction
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
-from ..result.result import Estimate
+from ..result.estimate import Estimate
 from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of

@@ -11,7 +11,8 @@ from ..experiment.experiment import Experiment
 from ..minimum.time_step import SWEEPS
 from ..quantities.parameters import Parameters
 from ..quantities.wording import short
-from ..result.result import Estimate, Refit
+from ..result.estimate import Estimate
+from ..result.result import Refit
 from ..statistics.identifiability import Identifiability
 from ..statistics.judge import Floor
 

@@ -9,7 +9,7 @@ import numpy as np
 from ..experiment.experiment import Experiment
 from ..experiment.force_sensor import CHANNELS
 from ..minimum.problem import FitProblem
-from ..result.result import ForceFit
+from ..result.motions import ForceFit
 
 Array = np.ndarray
 UNITS = (("N", slice(0, 3)), ("N m", slice(3, CHANNELS)))

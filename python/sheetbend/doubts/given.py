@@ -17,7 +17,7 @@ from ..arrays.checks import is_number
 from ..arrays.timeseries import Array
 from ..errors import InputError
 from ..minimum.problem import FitProblem
-from ..result.result import Premise
+from ..result.estimate import Premise
 from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.intervals import NORMAL
 from .told import GROUPS, Told, told_quantities

@@ -25,7 +25,7 @@ from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
 from ..optional import require
 from ..quantities.wording import short
-from ..result.result import UNSOUND
+from ..result.estimate import UNSOUND
 from ..statistics.blocks import short_of_frames
 from ..statistics.covariance import covariance
 from ..statistics.gauge import RANK_TOLERANCE, null_space

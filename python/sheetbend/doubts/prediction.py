@@ -18,7 +18,8 @@ from ..quantities.parameters import Parameters
 from ..recording.baseline import baseline
 from ..recording.oscillation import along, dominant_direction, first_frequency
 from ..recording.recording import Recording
-from ..result.result import Given, RecordingFit
+from ..result.estimate import Given
+from ..result.motions import RecordingFit
 from .force_comparison import ForceComparison, force_comparisons
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from ..arrays.timeseries import Array
 from ..minimum.problem import FitProblem
 from ..quantities.wording import quantity, side_words
-from ..result.result import Estimate
+from ..result.estimate import Estimate
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import NORMAL
 from ..statistics.profile import profile_interval

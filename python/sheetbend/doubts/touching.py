@@ -18,7 +18,8 @@ from ..minimum.problem import FitProblem
 from ..motion.contact_counts import ContactMode
 from ..motion.depth import too_deep
 from ..motion.simulate import Trajectory, simulate
-from ..result.result import ContactFit, Estimate, Kinks
+from ..result.estimate import Estimate
+from ..result.motions import ContactFit, Kinks
 from ..statistics.gauge import RANK_TOLERANCE
 
 

@@ -25,7 +25,7 @@ from ..arrays.timeseries import Array
 from ..minimum.discretization import Refinement
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
-from ..result.result import UNSOUND
+from ..result.estimate import UNSOUND
 from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of

@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..quantities.wording import figures, short
-from ..result.result import Estimate, RecordingFit
+from ..result.estimate import Estimate
+from ..result.motions import RecordingFit
 from .experiment import Experiment
 
 

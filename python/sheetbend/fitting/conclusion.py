@@ -31,7 +31,7 @@ from ..minimum.problem import FitProblem
 from ..minimum.time_step import Settled
 from ..quantities.parameters import Parameters
 from ..result.bootstrap import Bootstrap
-from ..result.result import Given, Premise
+from ..result.estimate import Given, Premise
 from ..statistics.identifiability import Identifiability
 from .clouds import driven_beside_clouds, told_beside_clouds
 from .reached import Reached

@@ -29,7 +29,7 @@ from ..optional import require
 from ..quantities.parameters import Parameter, Parameters
 from ..recording.recording import Recording
 from ..report.fit_result import FitResult
-from ..result.result import Estimate
+from ..result.estimate import Estimate
 from ..scene.scene import Scene
 from .conclusion import Asked, Systematic, conclude
 from .experiments import experiments_of

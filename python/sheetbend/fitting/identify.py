@@ -28,7 +28,7 @@ from ..minimum.smooth import Smooth, with_fields
 from ..optional import require
 from ..quantities.parameters import Parameters
 from ..recording.recording import Recording
-from ..result.result import Estimate
+from ..result.estimate import Estimate
 from ..scene.scene import Scene
 from ..statistics.covariance import Layout
 from ..statistics.identifiability import Identifiability

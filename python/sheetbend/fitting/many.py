@@ -21,9 +21,9 @@ from ..minimum.workers import shared_out
 from ..optional import require
 from ..quantities.parameters import Parameter, Parameters
 from ..report.many import ManyFit, OwnParameter
-from ..result.result import Estimate
+from ..result.estimate import Estimate
 from ..statistics.gauge import RANK_TOLERANCE, NullSpace, null_space
-from ..statistics.intervals import at_far_limit, clipped, half_width, known, linear_ends, open_estimate
+from ..statistics.intervals import at_far_limit, clipped, closed_estimate, linear_ends, open_estimate
 from ..statistics.judge import LEVEL
 from .experiments import within
 
@@ -163,20 +163,7 @@ def _estimate(
     lower, upper = clipped(parameter, linear_ends(parameter, at, reach))
     if lower is None or upper is None:
         return open_estimate(parameter, value, "the data hardly depend on it")
-    verdict, words = known(parameter, value, lower, upper)
-    half = half_width((lower, upper))
-    return Estimate(
-        name=parameter.name,
-        value=value,
-        unit=parameter.unit,
-        lower=lower,
-        upper=upper,
-        half_width=half,
-        statistical=half,
-        discretization=0.0,
-        verdict=verdict,
-        words=words,
-    )
+    return closed_estimate(parameter, value, lower, upper)
 
 
 def _own(problem: ManyProblem, wanted: Parameters, u: Array, arrow: Arrow, spread: Array) -> tuple[OwnParameter, ...]:

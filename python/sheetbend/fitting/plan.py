@@ -12,7 +12,7 @@ from typing import Any
 from ..files.whole import write_text
 from ..quantities.wording import figures, short
 from ..report.tables import Section, plain_section
-from ..result.result import Estimate
+from ..result.estimate import Estimate
 
 FORMAT = "sheetbend plan 1"
 

@@ -13,7 +13,7 @@ from ..minimum.growth import Growth, growths
 from ..minimum.optimizers import Minimum
 from ..minimum.problem import FitProblem
 from ..minimum.search import Found, Search
-from ..result.result import Estimate
+from ..result.estimate import Estimate
 
 
 @dataclass(frozen=True)

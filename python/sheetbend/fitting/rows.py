@@ -12,7 +12,9 @@ from ..minimum.growth import Growth
 from ..minimum.optimizers import Minimum
 from ..minimum.race import Raced
 from ..quantities.parameters import Parameters
-from ..result.result import Given, MotionGrowth, ProfileCurve, RecordingFit, Start
+from ..result.estimate import Given, ProfileCurve
+from ..result.motions import MotionGrowth, RecordingFit
+from ..result.result import Start
 from ..statistics.profile import Profile
 
 

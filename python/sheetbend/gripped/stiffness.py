@@ -11,7 +11,7 @@ import math
 from ..quantities.wording import short
 from ..report.fit_result import FitResult
 from ..report.tables import Section
-from ..result.result import Estimate
+from ..result.estimate import Estimate
 from .model import NAME
 from .over_density import quantity
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 from ..quantities.wording import short
 from ..report.fit_result import FitResult
-from ..result.result import Estimate
+from ..result.estimate import Estimate
 from .model import NAME
 from .over_density import as_quantities, in_units, is_over_density, quantity
 

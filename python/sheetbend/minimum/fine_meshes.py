@@ -16,7 +16,8 @@ import numpy as np
 
 from ..arrays.timeseries import Array
 from ..quantities.parameters import Parameters
-from ..result.result import Estimate, Refit
+from ..result.estimate import Estimate
+from ..result.result import Refit
 from ..statistics.profile import FARTHEST
 from .linear_step import gauss_newton, moves, one_step
 from .problem import FitProblem

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..report.tables import Section
-from ..result.result import UNSOUND, Estimate
+from ..result.estimate import UNSOUND, Estimate
 from .packed import packed_motions
 from .render import render, table
 from .shown import Shown

@@ -17,7 +17,8 @@ from ..quantities.wording import short
 from ..report.fit_result import FitResult
 from ..report.report import headline, sections
 from ..report.tables import Section
-from ..result.result import UNSOUND, Start
+from ..result.estimate import UNSOUND
+from ..result.result import Start
 from .packed import packed_motions
 from .profile_curves import HEIGHT, WIDTH, profile_pictures
 from .render import compressed, render, table

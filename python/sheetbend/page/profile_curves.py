@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..quantities.wording import short
-from ..result.result import FitData, ProfileCurve
+from ..result.estimate import ProfileCurve
+from ..result.result import FitData
 
 MOST = 48  # pictures
 WIDTH, HEIGHT = 200.0, 90.0

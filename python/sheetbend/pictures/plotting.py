@@ -19,7 +19,7 @@ from ..errors import InputError
 from ..files.whole import written
 from ..optional import require
 from ..quantities.wording import raised
-from ..result.result import Estimate
+from ..result.estimate import Estimate
 from .drawing import ACCENT, GRAY, INK, PALE, WARM, clean, key, panels_in, strip
 
 if TYPE_CHECKING:

@@ -13,7 +13,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..quantities.wording import short
-from ..result.result import Estimate, FitData
+from ..result.estimate import Estimate
+from ..result.result import FitData
 from ..statistics.population import Population, population
 from .tables import Section, plain_section
 

@@ -14,7 +14,9 @@ from ..files.door import reading
 from ..files.json_file import json_content
 from ..files.typed import as_dataclass, listed, mapping
 from ..files.whole import write_text
-from ..result.result import Estimate, FitData, RecordingFit
+from ..result.estimate import Estimate
+from ..result.motions import RecordingFit
+from ..result.result import FitData
 from .report import plain
 
 FORMAT = "sheetbend fit 1"

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..files.whole import write_text
 from ..quantities.wording import short
-from ..result.result import Estimate
+from ..result.estimate import Estimate
 from .tables import Section, plain_section
 
 FORMAT = "sheetbend many 1"

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 from ..optional import require
 from ..quantities.wording import figures, short
-from ..result.result import UNSOUND, Estimate, FitData, Given, MotionGrowth
+from ..result.estimate import UNSOUND, Estimate, Given
+from ..result.motions import MotionGrowth
+from ..result.result import FitData
 from .report_bootstrap import bootstrap
 from .report_contact import contact_sections
 from .report_driven import driven_sections

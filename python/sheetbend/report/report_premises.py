@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from ..quantities.wording import short
-from ..result.result import Estimate, FitData, Premise
+from ..result.estimate import Estimate, Premise
+from ..result.result import FitData
 from .tables import Section
 
 PREMISES_SHOWN = 8

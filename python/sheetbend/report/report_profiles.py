@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from ..quantities.wording import short
-from ..result.result import FitData, ProfileCurve
+from ..result.estimate import ProfileCurve
+from ..result.result import FitData
 from .tables import Section
 
 _SHOWN = 0.05  # an end that is so much nearer or farther than the linear picture has it

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ..quantities.wording import short
-from ..result.result import FitData, RecordingFit
+from ..result.motions import RecordingFit
+from ..result.result import FitData
 from .tables import Section
 
 

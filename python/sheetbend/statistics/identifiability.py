@@ -16,7 +16,7 @@ import numpy as np
 from ..arrays.timeseries import Array
 from ..errors import InputError
 from ..quantities.parameters import Parameters
-from ..result.result import Correlation, Estimate
+from ..result.estimate import Correlation, Estimate
 from .covariance import Layout
 from .gauge import RANK_TOLERANCE, Gauge
 from .judge import Floor, Judge, Linear, Nuisance

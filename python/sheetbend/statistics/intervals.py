@@ -6,7 +6,7 @@ import math
 
 from ..quantities.parameters import Parameter
 from ..quantities.wording import width_words
-from ..result.result import Estimate
+from ..result.estimate import Estimate
 from .profile import FARTHEST, Ends
 
 IDENTIFIED = 0.2
@@ -43,6 +43,24 @@ def open_estimate(
         statistical=None,
         discretization=float(more[0]),
         systematic=float(more[1]),
+        verdict=verdict,
+        words=words,
+    )
+
+
+def closed_estimate(parameter: Parameter, value: float, lower: float, upper: float) -> Estimate:
+    """Of a parameter whose whole interval comes from the residuals, identified or weak."""
+    half = (upper - lower) / 2
+    verdict, words = known(parameter, value, lower, upper)
+    return Estimate(
+        name=parameter.name,
+        value=value,
+        unit=parameter.unit,
+        lower=lower,
+        upper=upper,
+        half_width=half,
+        statistical=half,
+        discretization=0.0,
         verdict=verdict,
         words=words,
     )

@@ -12,7 +12,7 @@ from ..arrays.timeseries import Array
 from ..optional import require
 from ..quantities.parameters import Parameter, Parameters
 from ..quantities.wording import figures, floor_words, quantity, ran_off_words, side_words
-from ..result.result import Correlation, Estimate
+from ..result.estimate import Correlation, Estimate
 from .covariance import Covariance, Layout, covariance
 from .gauge import Gauge, null_space
 from .intervals import (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypedDict
 
 import numpy as np
 
@@ -21,6 +22,15 @@ from .shadow import Shadow, shadow
 
 _THICK, _RIM = 0.02, 1e-3  # m, of a plate that the cloth touches, and of its rounded edge
 _SAME = 1e-6  # relative difference in energy below which two states are one, turned or mirrored
+
+
+class Plates(TypedDict):
+    """Options of `drape` that say what lies between which plates; a test of a laboratory hands them on together."""
+
+    diameter: float
+    plate: float
+    friction: float | None
+    cover: bool
 
 
 @dataclass(frozen=True)

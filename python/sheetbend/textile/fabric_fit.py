@@ -18,9 +18,9 @@ from ..optional import require
 from ..quantities.parameters import Parameter, Parameters
 from ..quantities.wording import figures, short
 from ..report.tables import Section, plain_section
-from ..result.result import Estimate
+from ..result.estimate import Estimate
 from ..statistics.gauge import null_space
-from ..statistics.intervals import NORMAL, known, open_estimate
+from ..statistics.intervals import NORMAL, closed_estimate, open_estimate
 from .reading import Reading
 
 _UNITS = {"density": "kg/m^2", "warp": "N/m", "weft": "N/m", "shear": "N/m", "poisson": ""} | dict.fromkeys(
@@ -297,18 +297,4 @@ def _estimate(p: Parameter, internal: float, reach: float, gauges: str) -> Estim
         return open_estimate(p, value, "the readings leave it open by more than a factor of 1,000 either way")
     if math.isinf(reach):
         return open_estimate(p, value, gauges or "moves no reading: fix it, or measure what depends on it")
-    lower, upper = p.to_physical(internal - reach), p.to_physical(internal + reach)
-    half = (upper - lower) / 2
-    verdict, words = known(p, value, lower, upper)
-    return Estimate(
-        name=p.name,
-        value=value,
-        unit=p.unit,
-        lower=lower,
-        upper=upper,
-        half_width=half,
-        statistical=half,
-        discretization=0.0,
-        verdict=verdict,
-        words=words,
-    )
+    return closed_estimate(p, value, p.to_physical(internal - reach), p.to_physical(internal + reach))

@@ -11,7 +11,7 @@ from ..objects.fabric import Fabric
 from .bias_extension import bias_extension
 from .cantilever import cantilever
 from .curve import Curve, chosen, same_test
-from .drape import drape
+from .drape import DrapeState, Plates, drape
 from .fabric_fit import Measured
 from .kes import bending_loop, shear_loop
 from .outline import Outline
@@ -85,35 +85,34 @@ def bias_pulled(curves: Sequence[Curve], cycle: int = 0, error: float = MACHINE)
     return found
 
 
-def draped(
-    outlines: Sequence[Outline],
-    diameter: float,
-    plate: float,
-    error: float = DRAPED,
-    friction: float | None = None,
-    cover: bool = True,
-) -> Measured:
+def draped(outlines: Sequence[Outline], plates: Plates, error: float = DRAPED) -> Measured:
     """The drape coefficient of shadows, compared with the fabric's own state of as many folds.
 
     Args:
         outlines: a specimen each.
-        diameter, plate: of cloth and plates, m.
+        plates: with the diameters of cloth and plates, m.
         error: points of the coefficient by which states of one fabric differ.
-        friction, cover: of the plates, see `drape`.
     """
-    values = [outline.coefficient(diameter, plate) for outline in outlines]
-    folds = round(float(np.median([outline.nodes for outline in outlines])))
+    values = [outline.coefficient(plates["diameter"], plates["plate"]) for outline in outlines]
     specimens = {f"drape {k}": value for k, value in enumerate(values, start=1)}
+    folds = _folds(outlines)
     note = f"drapes are compared with the state that a start with {folds} folds leads to; others differ by a few points"
     return Measured.of_specimens(
         specimens,
         name="drape coefficient",
-        test=lambda f: (
-            drape(f, diameter=diameter, plate=plate, folds=(folds,), friction=friction, cover=cover).coefficient
-        ),
+        test=lambda f: as_draped(f, outlines, plates).coefficient,
         error=error,
         note=note,
     )
+
+
+def as_draped(fabric: Fabric, outlines: Sequence[Outline], plates: Plates) -> DrapeState:
+    """The state to which a start with as many folds as the outlines have leads."""
+    return drape(fabric, folds=(_folds(outlines),), **plates).states[0]
+
+
+def _folds(outlines: Sequence[Outline]) -> int:
+    return round(float(np.median([outline.nodes for outline in outlines])))
 
 
 def extensions(curves: Sequence[Curve], cycle: int, loads: Mapping[str, float]) -> dict[str, float | None]:
