@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import sheetbend as sb
-from blocks import ARM, AXIS, HINGE, MASS, RATE, SIDES, Flight, second_block
+from blocks import ARM, AXIS, HINGE, MASS, RATE, SIDES, Flight, level, leveled, second_block
 from sheetbend.arrays.rotations import matrices_of, rotation_matrix
 from sheetbend.quantities.quantities import Term
 
@@ -25,6 +25,7 @@ DOWN = np.array([0.0, 0.0, -9.81 / SCALE])  # m/s^2 in the unit of the data
 FEWEST = 7  # frames of free flight from which the state at the start is known well
 SOLVER = sb.Solver(h=1 / (8 * RATE), method="implicit")
 TOUCHING = sb.box_corners(SIDES / SCALE)
+CORNERS = sb.box_corners(SIDES)  # as the source has them
 BLOCKS = ("first", "second")
 BOX = dict(enumerate(np.diag(sb.Inertia.box(MASS, SIDES / SCALE).matrix).tolist(), start=1))  # kg m^2, homogeneous
 STIFFNESS = 6e4  # N/m, of a corner
@@ -39,9 +40,15 @@ FOUND = {  # of the first block, and alike of the second
 
 @dataclass(frozen=True)
 class Toss(Flight):
-    """From where the blocks fly freely until they rest; free: frames of free flight."""
+    """From where the blocks fly freely until they rest.
+
+    Attributes:
+        free: frames of free flight.
+        recorded_up: z of the recording, in the axes of the poses here.
+    """
 
     free: int
+    recorded_up: np.ndarray
 
     def middle(self) -> np.ndarray:
         """(frames, 3) m, between the centers of the blocks."""
@@ -54,7 +61,8 @@ def tosses() -> list[Toss]:
     x, q, angles = (data[key].astype(float) for key in ("positions", "quaternions", "angles"))
     ends = zip(data["starts"][:-1], data["starts"][1:], data["toss"], data["free"], strict=True)
     return [
-        Toss(f"toss {n}", np.arange(b - a) / RATE, x[a:b], q[a:b], angles[a:b], int(free)) for a, b, n, free in ends
+        Toss(f"toss {n}", np.arange(b - a) / RATE, *leveled(n, x[a:b], q[a:b]), angles[a:b], int(free), level(n)[:, 2])
+        for a, b, n, free in ends
     ]
 
 
@@ -89,7 +97,7 @@ def start_of(toss: Toss) -> Start:
     return Start(body, float(angle), float(rate), middle, velocity)
 
 
-def scene_of(toss: Toss) -> sb.Scene:
+def scene_of(toss: Toss, height: float = 0.0) -> sb.Scene:
     """The blocks that fly from their first frames onto the table. `rounding` is the radius of their corners, m, and
     `stretch` what lengths are longer than SCALE makes them."""
     start = start_of(toss)
@@ -99,7 +107,7 @@ def scene_of(toss: Toss) -> sb.Scene:
     first = scene.add_body("first", of=box, **start.body)
     second = scene.add_body("second", of=box, at=centers[0], rotation=turned[0])
     sb.hinge(first, second, at=at + frame @ HINGE, axis=frame @ AXIS, rate=start.rate, viscosity=1e-4)
-    table = sb.Plane(name="table")
+    table = sb.Plane(name="table", point=(0.0, 0.0, height))
     for body in (first, second):
         name = f"{body.name}_table"
         scene.contact(body, table, friction=0.2, stiffness=STIFFNESS, dissipation=2.0, points=TOUCHING, name=name)
@@ -128,31 +136,60 @@ def of_both(values: Mapping[str, float]) -> dict[str, float]:
     return {**values, **{other(name): value for name, value in values.items()}}
 
 
+def poses(toss: Toss, values: Mapping[str, float]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Predicted places (frames, 3) and attitudes (frames, 3, 3) of both blocks."""
+    scene = scene_of(toss)
+    motion = sb.simulate(scene, toss.times, SOLVER, values)
+    return [scene.bodies[block].pose(motion, values) for block in BLOCKS]
+
+
+def shift(toss: Toss, rest: list[tuple[np.ndarray, np.ndarray]]) -> float:
+    """How far blocks that rest so are to be moved up to lie as recordings do: at rest the lowest corner is at z = 0."""
+    low = min(((x[-1] + CORNERS @ frames[-1].T) @ toss.recorded_up).min() for x, frames in rest)
+    return -float(low) / float(toss.recorded_up[2])
+
+
+def predicted(toss: Toss, values: Mapping[str, float]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """The same on a table as high as the recordings have it. That height follows from where the blocks rest, so a first
+    prediction finds it, on a table below where they would be if nothing stopped them."""
+    end = without_table(toss)[-1]
+    up = toss.recorded_up
+    height = -float(up[:2] @ end[:2] / up[2])
+    first = poses(toss, {**values, "table_z": height})
+    return poses(toss, {**values, "table_z": height + shift(toss, first)})
+
+
+def centers_apart(toss: Toss, found: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """(2, frames) mm, of the blocks' predicted centers from the recorded ones."""
+    seen = np.stack([toss.positions, toss.second()[0]])
+    return 1e3 * np.linalg.norm(np.stack([places for places, _ in found]) - seen, axis=2)
+
+
 def errors(toss: Toss, values: Mapping[str, float]) -> np.ndarray:
     """Of a prediction, means of both blocks: of their centers in mm, mean over time and at rest, and of their attitudes
     in degrees, likewise."""
-    scene = scene_of(toss)
-    motion = sb.simulate(scene, toss.times, SOLVER, values)
-    found = []
-    for block, (x, frames) in zip(
-        BLOCKS, ((toss.positions, matrices_of(toss.quaternions)), toss.second()), strict=True
-    ):
-        places, axes = scene.bodies[block].pose(motion, values)
-        cosine = (np.einsum("fij,fij->f", axes, frames) - 1.0) / 2.0
-        angle = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
-        apart = 1e3 * np.linalg.norm(places - x, axis=1)
-        found.append([apart.mean(), apart[-1], angle.mean(), angle[-1]])
-    return np.mean(found, axis=0)
+    found = predicted(toss, values)
+    apart = centers_apart(toss, found)
+    seen = np.stack([matrices_of(toss.quaternions), toss.second()[1]])
+    cosine = (np.einsum("bfij,bfij->bf", np.stack([axes for _, axes in found]), seen) - 1.0) / 2.0
+    angle = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    return np.array([apart.mean(), apart[:, -1].mean(), angle.mean(), angle[:, -1].mean()])
+
+
+def without_table(toss: Toss) -> np.ndarray:
+    """Where the middle goes on as it flew until it is as low as it rests, and stays: (frames, 3) m."""
+    start = start_of(toss)
+    along = start.middle + np.outer(toss.times, start.velocity) + 0.5 * np.outer(toss.times**2, DOWN)
+    low = along @ toss.recorded_up < SIDES[2] / 2 / SCALE
+    stops = int(low.argmax()) if low.any() else len(along) - 1
+    along[stops:] = along[stops]
+    return along
 
 
 def without_physics(toss: Toss) -> np.ndarray:
     """The error of the middle, where it lies still from the last frame of free flight, and where it goes on as it flew
     until it is as low as it rests: two rows."""
-    x, start = toss.middle(), start_of(toss)
-    along = start.middle + np.outer(toss.times, start.velocity) + 0.5 * np.outer(toss.times**2, DOWN)
-    low = along[:, 2] < SIDES[2] / 2 / SCALE
-    stops = int(low.argmax()) if low.any() else len(x) - 1
-    along[stops:] = along[stops]
+    x, along = toss.middle(), without_table(toss)
     still = x.copy()
     still[toss.free :] = x[toss.free - 1]
     return np.array([[a.mean(), a[-1]] for a in (1e3 * np.linalg.norm(way - x, axis=1) for way in (still, along))])

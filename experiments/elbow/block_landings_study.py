@@ -13,10 +13,10 @@ import sys
 
 import numpy as np
 import sheetbend as sb
-from block_landings import BLOCKS, BOX, FEWEST, SCALE, SOLVER, Toss, errors, halves, of_both, other, scene_of
+from block_landings import BLOCKS, BOX, FEWEST, SCALE, SOLVER, TOUCHING, Toss, errors, halves, of_both, other, scene_of
 from blocks import CORNERS
 from scipy.optimize import minimize
-from sheetbend.arrays.rotations import quaternions_of
+from sheetbend.arrays.rotations import matrices_of, quaternions_of
 
 AFTER = 10  # frames from the end of free flight on that the fit sees
 COMPARED = CORNERS / SCALE
@@ -42,9 +42,15 @@ SEARCH = {  # start, and the first step in its logarithm; heavier: moments of in
 }
 
 
+def seen_height(toss: Toss) -> float:
+    """Of the table, m, from where the blocks rest."""
+    seen = (toss.positions, matrices_of(toss.quaternions)), toss.second()
+    return float(min((x[-1] + TOUCHING @ frames[-1].T)[:, 2].min() for x, frames in seen))
+
+
 def experiment(toss: Toss) -> sb.Experiment:
     """A toss up to its first frames after contact."""
-    scene, until = scene_of(toss), min(toss.free + AFTER, len(toss.times))
+    scene, until = scene_of(toss, seen_height(toss)), min(toss.free + AFTER, len(toss.times))
     centers, turned = toss.second()
     poses = (toss.positions, toss.quaternions), (centers, quaternions_of(turned))
     parts = [sb.Recording.from_poses(toss.times[:until], x[:until], q[:until], COMPARED) for x, q in poses]
