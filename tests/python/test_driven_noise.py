@@ -13,7 +13,7 @@ import sheetbend as sb
 from pytest import approx
 from sheetbend.cli.app import app
 from sheetbend.config import Study, build, parse
-from sheetbend.doubts.driven_errors import FEW, drawn_noise, driven_errors
+from sheetbend.doubts.driven_errors import FEW, DrivenErrors, drawn_noise, driven_errors
 from sheetbend.doubts.driven_noise import driven_doubts, driven_noises
 from sheetbend.experiment.driven_motion import estimated_motion
 from sheetbend.fitting.fitted_motion import fitted_positions
@@ -339,6 +339,25 @@ def test_the_slope_of_what_noise_adds_is_that_of_its_size():
     slope = drawn.slope(u, problem.evaluate(u)[2])
     for k, step in enumerate(1e-3 * np.eye(len(u))):
         assert slope[k] == approx((squares(u + step) - squares(u - step)) / 2e-3, rel=0.02, abs=0.02 * abs(slope).max())
+
+
+def test_experiments_that_the_same_parameters_act_on_stand_for_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two draws in all: each of two experiments has one, and the outer two of three stand for all."""
+    monkeypatch.setattr("sheetbend.doubts.driven_errors.DIRECTIONS", 2)
+    every = [shaken(seed, frames=61, driven_sigma=None) for seed in (14, 15, 16)]
+    for experiments, asked in ((every[:2], (0, 1)), (every, (0, 2))):
+        problem = problem_of(*experiments)
+        u, _ = at(problem, every[0])
+        drawn = drawn_noise(problem, u, 8)
+        assert drawn is not None
+
+        def squares(at: Array, drawn: DrivenErrors = drawn, asked: tuple[int, ...] = asked) -> float:
+            return sum(float((drawn.problem.core.respond(i, at, drawn.draws[i][:1]) ** 2).sum()) for i in asked)
+
+        slope, share = drawn.slope(u, problem.evaluate(u)[2]), len(experiments) / len(asked)
+        for k, step in enumerate(1e-3 * np.eye(len(u))):
+            expected = share * (squares(u + step) - squares(u - step)) / 2e-3
+            assert slope[k] == approx(expected, rel=0.02, abs=0.02 * abs(slope).max())
 
 
 def test_sigmas_that_belie_the_residuals_are_told():

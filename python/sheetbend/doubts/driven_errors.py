@@ -20,8 +20,9 @@ too much, and the draws are made smaller.
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -39,7 +40,7 @@ PACK = 8  # draws that share a rollout
 UNFELT = 0.2  # standard errors: what moves estimates by less adds no more than 2 % to an interval
 CHANCE = 0.05  # share of the draws that resemble the others less than residuals of such noise are taken to do
 SOUND = 0.5  # to which draws may have been made smaller where a bias is told: beyond, the tangents say too much
-DIRECTIONS = 8  # of noise, at least, that a parameter's slope is told from
+DIRECTIONS = 8  # of noise, over all experiments that the same parameters act on, from which their slope is told
 STEP = 0.1  # of the noise, along which a Jacobian changes
 FEWEST = 12  # knots, that tell the noise of a motion
 STEADY = 3.0  # times its noise: by so much the distance of a marker from a driven particle varies at most
@@ -66,27 +67,49 @@ class DrivenErrors:
     def slope(self, u: Array, J: Array) -> Array:
         """(free,) by u (free,): how the mean over the draws of the sum of squares grows that noise adds to twice the
         cost, in motions whose tangents are to be believed. That of |A n|^2 is twice A n times how J changes along n.
+        Of many experiments that the same parameters act on, some stand for all.
 
         Args:
             J: (rows, free) at u.
         """
-        rows, experiments = self.problem.core.first_rows, self.problem.experiments
-        sound = [i for i in self.draws if self.believed[i] >= SOUND]
-        acting = [name for i in sound for name in self.problem.acting_on(experiments[i])]
-        if not acting:
-            return np.zeros(len(u))
-        fewest = min(acting.count(name) for name in acting)
-        total, made = np.zeros(len(u)), 0
-        for k in range(min(-(-DIRECTIONS // fewest), *(len(self.draws[i]) for i in sound))):
-            along = {experiments[i].name: STEP * self.draws[i][k] for i in sound}
-            ok, _, there = self.problem.moved(along).evaluate(u)
-            if not ok:
-                continue
-            made += 1
-            for i in sound:
-                own = slice(rows[i], rows[i + 1])
-                total += 2.0 / STEP * (self.moved[i][k] / self.believed[i]) @ (there[own] - J[own])
-        return total / max(made, 1)
+        rows, free, told = self.problem.core.first_rows, self.problem.parameters.free, dict[int, list[Array]]()
+        several = self._alike()
+        for k, every in enumerate(zip_longest(*map(_dealt, several), fillvalue=())):
+            asked = [i for part in every for i in part if k < len(self.draws[i])]
+            if not asked:
+                break
+            along = {self.problem.experiments[i].name: STEP * self.draws[i][k] for i in asked}
+            there = self.problem.piece(asked).moved(along)
+            mine = [free.index(name) for name in there.parameters.free]
+            ok, _, changed = there.evaluate(u[mine])
+            for n, i in enumerate(asked if ok else ()):
+                own, other = slice(rows[i], rows[i + 1]), slice(*there.core.first_rows[n : n + 2])
+                slope = np.zeros(len(u))
+                slope[mine] = 2.0 / STEP * (self.moved[i][k] / self.believed[i]) @ (changed[other] - J[own][:, mine])
+                told.setdefault(i, []).append(slope)
+        total = np.zeros(len(u))
+        for places in several:
+            means = [np.mean(told[i], axis=0) for i in places if i in told]
+            if means:
+                total += len(places) * np.mean(means, axis=0)
+        return total
+
+    def _alike(self) -> list[list[int]]:
+        """Places of the experiments whose tangents are to be believed; those together on which the same parameters act,
+        and which stand for each other."""
+        found: dict[tuple[str, ...], list[int]] = {}
+        for i in self.draws:
+            acting = self.problem.acting_on(self.problem.experiments[i])
+            if self.believed[i] >= SOUND and acting:
+                found.setdefault(acting, []).append(i)
+        return list(found.values())
+
+
+def _dealt(places: Sequence[int]) -> list[Sequence[int]]:
+    """Those asked for their first draw, for their second, ...: `DIRECTIONS` in all, spread evenly over many."""
+    few = [places[n] for n in np.unique(np.linspace(0, len(places) - 1, DIRECTIONS).astype(int))]
+    dealt = (few * DIRECTIONS)[:DIRECTIONS]
+    return [dealt[k : k + len(few)] for k in range(0, DIRECTIONS, len(few))]
 
 
 def drawn_noise(problem: FitProblem, u: Array, draws: int) -> DrivenErrors | None:

@@ -62,7 +62,7 @@ class Approach:
         u: (free,) where it is, with its cost (half the sum of squares): infinite where the start has no answer.
         free: whether its last step was as good as promised at the first try, and held up by no limit.
         near: whether the last step was as good as promised, held up by no limit, and a small part of the longest.
-        least: share of the cost that a step must promise.
+        enough: share of the cost that a step must promise.
         promised: share of the cost that the last step was to take off.
         taken: share of the cost that it took off.
         iterations: steps so far.
@@ -76,12 +76,14 @@ class Approach:
         self._longest, self._radius = problem.coordinates.longest, 1.0
         self.free = self.near = False
         self.promised = self.taken = 1.0
+        self.enough = LEAST
         self.iterations = 0
         self.cost, self._r, self._J = self._evaluated(self.u, True)
 
     @property
     def least(self) -> float:
-        return LEAST
+        """Share of the cost below which no step is taken."""
+        return self.enough
 
     def _inside(self, J: Any, lower: Array, upper: Array) -> Array:
         """The best step in a box."""

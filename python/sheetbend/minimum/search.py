@@ -282,7 +282,10 @@ class _Way:
         raise AssertionError("the whole motion comes last")
 
     def _walk(self, walk: Approach, tolerance: float, most: int, window: float | None) -> None:
-        """Steps until the next promises little, and on the whole motion until it is near."""
+        """Steps until the next promises little, and on the whole motion until it is near. There a step that promises
+        less than the tolerance of the search is not taken: it would cost a Jacobian where it ends."""
+        if window is None:
+            walk.enough = max(LEAST, self.search.tolerance)
         while walk.iterations < most and not (window is None and walk.near) and walk.step():
             self._arrived(walk, window)
             if walk.promised < tolerance or walk.taken < tolerance:
