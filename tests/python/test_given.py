@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.report.fit_result import FitResult
+from sheetbend.report.resting import Rests, rests, told_to_rest
+from sheetbend.result.result import Estimate, Premise
 from test_contact_fit import SOLVER as DRAGGING
 from test_contact_fit import TIMES as DRAGGED
 from test_contact_fit import dragged
@@ -161,9 +163,71 @@ def test_a_density_that_is_off_is_named_and_counts(recording: sb.Recording) -> N
     assert told.moved["rope_EI"] == pytest.approx(0.01 * estimate.value, rel=1e-3)
     assert "What the result rests on" in found.report()
     assert "rope_density" in found.report()
+    assert estimate.words.startswith("known to") and "if the error in rope_density is below 0.02" in estimate.words
     honest = fit(hanging(density=0.055), recording, given={"rope_density": 0.1})["rope_EI"]
     assert honest.lower < TRUTH["EI"] < honest.upper
     assert honest.systematic == pytest.approx(1.96 * 0.1 * estimate.value, rel=1e-3)
+
+
+def test_an_error_that_shows_is_not_what_an_estimate_rests_on(clean: sb.Recording, plain: sb.Fit) -> None:
+    """1 % of the length moves EI by 190 half-widths, 1 % of the density by 40; but the length would be named."""
+    length, density = premise(plain, "rope_length"), premise(plain, "rope_density")
+    assert length.moved["rope_EI"] > 4 * density.moved["rope_EI"]
+    assert rests(plain.result)["rope_EI"].name == "rope_density"
+    assert 0 <= density.leaves < 1e-3 < 100 < length.leaves
+    left = math.sqrt(2 * fit(CHANGED["rope_length"][0](1e-3), clean).result.cost)
+    assert length.leaves == pytest.approx(10 * left, rel=0.02)
+
+
+def test_an_estimate_rests_on_what_may_move_it_unseen() -> None:
+    """Of a friction that a table 0.25 degrees off moves by 2.7 half-widths and of which the residuals tell nothing."""
+    names = {"friction": 0.0072, "EI": 0.0025}
+    estimates = tuple(
+        Estimate(
+            name=name,
+            value=50 * half,
+            unit="",
+            lower=49 * half,
+            upper=51 * half,
+            half_width=half,
+            statistical=half,
+            discretization=0.0,
+            verdict="identified",
+            words="known to 2 %",
+        )
+        for name, half in names.items()
+    )
+    table = Premise(
+        name="table about x",
+        value=None,
+        unit="rad",
+        off_by=DEGREE,
+        words="1 degree",
+        moved={"friction": 0.078, "EI": -6e-3},
+        leaves=10.0,
+    )
+    other = {"name": "rope_length", "value": 0.3, "unit": "m", "off_by": 3e-3, "words": "1 %"}
+    length = Premise(**other, moved={"friction": 0.01}, leaves=1e4)
+    course = {"recordings": (), "optimizer": "", "iterations": 1, "seconds": 1.0, "converged": True}
+    whole = FitResult(estimates=estimates, premises=(table, length), cost=380.0, rows=760, **course)
+    assert rests(whole) == {"friction": Rests("table about x", "0.092 degrees", 0)}
+    text = whole.report()
+    assert "identified  table about x 0.092 degrees" in text
+    assert "right to: table about x 0.092 degrees. A larger error" in text
+    long = tuple(replace(e, name=f"{e.name}_of_the_table") for e in estimates)
+    moved = {f"{name}_of_the_table": by for name, by in table.moved.items()}
+    narrow = replace(whole, estimates=long, premises=(replace(table, moved=moved),)).report()
+    assert "verdicts hold if: friction_of_the_table: the error in table about x is below 0.092 degrees" in narrow
+    assert [e.words for e in told_to_rest(whole)] == [
+        "known to 2 %, if the error in table about x is below 0.092 degrees",
+        "known to 2 %",
+    ]
+    assert rests(replace(whole, premises=(replace(table, sd=DEGREE), length))) == {}
+    assert rests(replace(whole, premises=(replace(table, leaves=1e3), length))) == {}
+    unseen = replace(whole, premises=(table, replace(length, leaves=0.0)))
+    assert rests(unseen)["friction"].cell == "table about x 0.092 degrees, 1 more"
+    doubtful = replace(whole, estimates=tuple(replace(e, verdict="doubtful") for e in estimates))
+    assert rests(doubtful) == {} and "right to" not in doubtful.report()
 
 
 def test_the_report_stays_narrow(recording: sb.Recording, plain: sb.Fit) -> None:

@@ -103,12 +103,12 @@ def test_a_given_drag_that_is_too_small_is_named() -> None:
 
 
 def test_a_restitution_that_is_missing_is_named() -> None:
-    """Friction and EI were "identified", at a reduced chi-square of 2; beside a fall of 5 cm EI was 3.5 half-widths
-    off, and noise of the hand was blamed."""
-    problem, u = minimum(seen(dragged(height=0.03, restitution=0.5), dragged(0.2, 2e-4, height=0.03), 0))
+    """Friction and EI were "identified", at a reduced chi-square of 1.5. Of the sizes that are tried, 0.3 and 0.4 leave
+    too much to be named."""
+    problem, u = minimum(seen(dragged(height=0.03, restitution=0.35), dragged(0.3, 1e-4, height=0.03), 0))
     said = other_losses(problem, u)
     assert set(said) == set(NAMES)
-    assert "drag bounces where the model comes to rest: with a restitution of 0.5 the fit" in said["rope_EI"]
+    assert "drag bounces where the model comes to rest: with a restitution of 0.33 the fit" in said["rope_EI"]
 
 
 @pytest.mark.parametrize("make", [dragged, thrown])

@@ -1,7 +1,8 @@
 """Restitution of contacts that a model gives none, at some sizes of it.
 
 A little of it changes nothing: an approach that would leave slower than what gravity adds in two substeps comes to
-rest. So there is no derivative at zero, and sizes are tried.
+rest. So there is no derivative at zero, and sizes are tried. From the best of them on there is one, and the restitution
+is fitted along.
 """
 
 from __future__ import annotations
@@ -11,8 +12,10 @@ from dataclasses import replace
 
 from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
-from ..quantities.quantities import Term
+from ..quantities.parameters import Parameter, Parameters
+from ..quantities.quantities import Quantity, Term
 
+RESTITUTION = Parameter(name="restitution", initial=0.5, lower=0.0, upper=1.0, scale=0.1)
 SIZES = tuple(k / 10 for k in range(1, 10))
 
 
@@ -27,10 +30,20 @@ def with_bounce(problem: FitProblem, restitution: float) -> FitProblem:
     return problem.of([_bouncing(e, restitution) if has_no_bounce(e) else e for e in problem.experiments])
 
 
+def with_free_bounce(problem: FitProblem) -> FitProblem:
+    """The same, with the restitution as one more parameter, the last one."""
+    more = problem.of([_bouncing(e, 0.5) if has_no_bounce(e) else e for e in problem.experiments])
+    given = Parameters([*problem.given.values(), RESTITUTION])
+    every = Parameters([*problem.parameters.values(), RESTITUTION])
+    return FitProblem(more.experiments, given, problem.recordings, problem.threads, every)
+
+
 def _bouncing(e: Experiment, restitution: float) -> Experiment:
+    name = RESTITUTION.name
     scene = e.scene.shallow()
+    scene.quantities = {**e.scene.quantities, name: Quantity(name, restitution, "", positive=False, scale=0.1)}
     scene.contacts = copy.copy(e.scene.contacts)
     scene.contacts.contacts = [replace(c, bounces=True) for c in e.scene.contacts.contacts]
-    more = [Term("restitution", k, restitution, ()) for k in range(len(scene.contacts.contacts))]
+    more = [Term("restitution", k, 1.0, ((name, "identity"),)) for k in range(len(scene.contacts.contacts))]
     scene.terms = [*e.scene.terms, *more]
     return replace(e, scene=scene)

@@ -27,13 +27,15 @@ NOTHING_FELT = 1e-9  # of a half-width: a told number that moves less has no par
 
 @dataclass
 class _Errors:
-    """The independent errors of one told number: J'g of each by label, over all experiments."""
+    """The independent errors of one told number: J'g and g'g of each by label, over all experiments."""
 
     told: Told
     columns: dict[str, Array] = field(default_factory=dict)
+    squares: dict[str, float] = field(default_factory=dict)
 
-    def add(self, label: str, column: Array) -> None:
+    def add(self, label: str, column: Array, square: float) -> None:
         self.columns[label] = self.columns.get(label, 0.0) + column
+        self.squares[label] = self.squares.get(label, 0.0) + square
 
 
 def check_given(given: Mapping[str, float], problem: FitProblem) -> None:
@@ -72,12 +74,14 @@ def premises(problem: FitProblem, u: Array, given: Mapping[str, float], told: Se
     for one in told:
         if one.name:
             mine = J[rows[one.experiment] : rows[one.experiment + 1]][one.rows]
-            errors.setdefault(one.name, _Errors(one)).add(one.label, mine.T @ one.column)
-    solve = _Response(problem, u, J)
+            errors.setdefault(one.name, _Errors(one)).add(
+                one.label, mine.T @ one.column, float(one.column @ one.column)
+            )
+    solve, tested = _Response(problem, u, J), not problem.estimates_corrections
     return tuple(
         premise
         for name, each in errors.items()
-        for premise in _premises(name, each, solve, given)
+        for premise in _premises(name, each, solve, given, tested)
         if any(abs(moved) > NOTHING_FELT * abs(solve.size[parameter]) for parameter, moved in premise.moved.items())
     )
 
@@ -115,12 +119,20 @@ class _Response:
         """What one unit of a told number moves, for J'g (free,)."""
         return np.asarray(-self._diagonal * (self._inverse @ column[self.columns]))
 
+    def leaves(self, column: Array, square: float) -> float:
+        """What the parameters leave of one unit of it in the residuals, for J'g (free,) and g'g."""
+        mine = column[self.columns]
+        return math.sqrt(max(square - float(mine @ self._inverse @ mine), 0.0))
 
-def _premises(name: str, errors: _Errors, solve: _Response, given: Mapping[str, float]) -> Iterator[Premise]:
+
+def _premises(
+    name: str, errors: _Errors, solve: _Response, given: Mapping[str, float], tested: bool
+) -> Iterator[Premise]:
     told = errors.told
     moved = {label: told.step[0] * solve(column) for label, column in errors.columns.items()}
     if name == "markers" and moved:  # independent of each other
         moved = {name: np.sqrt(np.square(list(moved.values())).sum(axis=0))}
+        tested = False  # of many errors at once no single one is named
     sd = given.get(name)
     for label, by in moved.items():
         off_by = told.step[0]
@@ -133,5 +145,6 @@ def _premises(name: str, errors: _Errors, solve: _Response, given: Mapping[str, 
             off_by=off_by,
             words=told.step[1],
             moved={n: float(m) for n, m, k in zip(solve.names, by, solve.known, strict=True) if k},
+            leaves=told.step[0] * solve.leaves(errors.columns[label], errors.squares[label]) if tested else 0.0,
             sd=None if sd is None else sd * abs(told.value) if told.relative and told.value is not None else sd,
         )

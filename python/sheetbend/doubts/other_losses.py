@@ -4,9 +4,9 @@ What a little more loss changes is known to first order (`missing_loss`, `held_l
 in another way: what a little of it would damp is long gone, and what fits leave without it is large and alike over
 time, so that no direction is told from chance. So fits are made with other losses: each that was given gets a third and
 three times its size, and elements that have a stiffness and no damping are given one, all together and each kind by
-itself (`absent_damping`). Contacts that come to rest at once are given a restitution (`absent_bounce`). What two
-Gauss-Newton steps leave then decides: a model that is wrong in another way leaves nearly as much with any loss. States
-of motions in windows take as many steps as the parameters do.
+itself (`absent_damping`). Contacts that come to rest at once are given a restitution (`absent_bounce`), and from the
+best of those tried on it is fitted along. What two Gauss-Newton steps leave then decides: a model that is wrong in
+another way leaves nearly as much with any loss. States of motions in windows take as many steps as the parameters do.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ..minimum.problem import FitProblem
 from ..quantities.wording import short
 from ..statistics.gauge import RANK_TOLERANCE
 from .absent_bounce import SIZES as BOUNCES
-from .absent_bounce import has_no_bounce, with_bounce
+from .absent_bounce import has_no_bounce, with_bounce, with_free_bounce
 from .absent_damping import FRAMES, undamped, with_damping
 from .directions import LEVEL, chance_of_drop, noise_in, rows_of, tied
 from .held_losses import held_names, of_size
@@ -49,11 +49,19 @@ class _Group:
     left: float
 
 
+@dataclass(frozen=True)
+class _End:
+    """Where a few steps end, (free,), and the residuals (rows,) there."""
+
+    u: Array
+    r: Array
+
+
 def other_losses(problem: FitProblem, u: Array) -> dict[str, str]:
     """By free parameter, the loss of its motion with which a fit would leave much less, the best of those tried.
 
-    Takes two simulations for each loss, and a Jacobian and a third where these leave less. A loss with which the motion
-    has no answer tells nothing.
+    Takes two simulations for each loss, and a Jacobian and a third where these leave less; for a restitution two more
+    Jacobians in all. A loss with which the motion has no answer tells nothing.
 
     Args:
         problem: as it was fitted.
@@ -65,9 +73,12 @@ def other_losses(problem: FitProblem, u: Array) -> dict[str, str]:
         return {}
     best: dict[int, tuple[float, Says]] = {}
     stepping = problem.of([in_steps(e, 1) for e in problem.experiments])
-    tried = list(_tried(stepping, u, groups))
-    for more, says in tried:
-        after = _reached(more, u, J, groups)
+    tried = [
+        *((says, _reached(more, u, J, groups)) for more, says in _tried(stepping, u, groups)),
+        *_bounces(stepping, u, J, groups),
+    ]
+    for says, end in tried:
+        after = None if end is None else end.r
         for k, group in enumerate(groups):
             if after is None or (share := _less(group, after)) <= max(LESS, best[k][0] if k in best else 0.0):
                 continue
@@ -99,8 +110,7 @@ def _unexplained(problem: FitProblem, r: Array) -> list[_Group]:
 
 def _tried(problem: FitProblem, u: Array, groups: list[_Group]) -> Iterator[tuple[FitProblem, Says]]:
     """Problems with other losses, and what it says of the model if one of them leaves less."""
-    motions = [problem.experiments[i] for group in groups for i in group.motions]
-    scenes = [e.scene for e in motions]
+    scenes = [problem.experiments[i].scene for group in groups for i in group.motions]
     for name in held_names(problem):
         if any(name in scene.quantities for scene in scenes):
             for times, (size, share) in SIZES.items():
@@ -109,26 +119,42 @@ def _tried(problem: FitProblem, u: Array, groups: list[_Group]) -> Iterator[tupl
     for only in (*([""] if bare else []), *(bare if len(bare) > 1 else [])):
         for frames in FRAMES:
             yield with_damping(problem, u, frames, only), _lacks_damping(only)
-    for restitution in BOUNCES if any(map(has_no_bounce, motions)) else ():
-        yield with_bounce(problem, restitution), _lacks_bounce(restitution)
 
 
-def _reached(more: FitProblem, u: Array, J: Array, groups: list[_Group]) -> Array | None:
-    """(rows,) what two Gauss-Newton steps from u leave, the first with the Jacobian J of another problem; None where
-    that first one leaves no less of any group, or where there is no answer."""
+def _bounces(problem: FitProblem, u: Array, J: Array, groups: list[_Group]) -> Iterator[tuple[Says, _End | None]]:
+    """Restitutions of some sizes, and what it says of the model if one of them leaves less; last the one that is fitted
+    along, from the best of these on."""
+    if not any(has_no_bounce(problem.experiments[i]) for group in groups for i in group.motions):
+        return
+    found: list[tuple[float, Array]] = []
+    for restitution in BOUNCES:
+        end = _reached(with_bounce(problem, restitution), u, J, groups)
+        yield _lacks_bounce(restitution), end
+        if end is not None:
+            found.append((float(end.r @ end.r), np.append(end.u, restitution)))
+    if found:
+        free, start = with_free_bounce(problem), min(found, key=lambda each: each[0])[1]
+        end = _reached(free, start, None, groups)
+        yield _lacks_bounce(start[-1] if end is None else end.u[-1]), end
+
+
+def _reached(more: FitProblem, u: Array, J: Array | None, groups: list[_Group]) -> _End | None:
+    """Where two Gauss-Newton steps from u end, the first with the Jacobian J of another problem if it is given; None
+    where that first one leaves no less of any group, or where there is no answer."""
     try:
-        ok, r, _ = more.evaluate(u, jacobian=False)
-        first = limited_step(more, u, r, J) if ok else u
+        ok, r, own = more.evaluate(u, jacobian=J is None)
+        first = limited_step(more, u, r, own if J is None else J) if ok else u
         ok, r, _ = more.evaluate(first, jacobian=False)
         if not ok or all(_less(group, r) <= 0.0 for group in groups):
             return None
         ok, r, J = more.evaluate(first)
         if not ok or not np.isfinite(J).all():
             return None
-        ok, after, _ = more.evaluate(limited_step(more, first, r, J), jacobian=False)
+        second = limited_step(more, first, r, J)
+        ok, after, _ = more.evaluate(second, jacobian=False)
     except SheetbendError:
         return None
-    return after if ok and float(after @ after) < float(r @ r) else r
+    return _End(second, after) if ok and float(after @ after) < float(r @ r) else _End(first, r)
 
 
 def limited_step(problem: FitProblem, u: Array, r: Array, J: Array) -> Array:

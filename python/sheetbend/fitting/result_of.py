@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from ..minimum.field_fits import field_fits
 from ..minimum.fine_meshes import at_the_limit
 from ..minimum.smooth import Field
 from ..report.fit_result import FitResult
+from ..report.resting import told_to_rest
 from .conclusion import Conclusion
 from .reached import Reached
 from .rows import curves, every_end, given_rows, growth_rows, recording_fit, start_rows
@@ -104,7 +105,7 @@ def result_of(
         *outside(conclusion.experiments, conclusion.values),
         *(() if interrupted else (*misread(problem, best.u), *implausible(problem))),
     )
-    return FitResult(
+    result = FitResult(
         estimates=estimates,
         recordings=told_clocks(errors, conclusion.experiments, conclusion.values, estimates),
         cost=best.cost if at.problem is problem else at.cost,
@@ -143,3 +144,4 @@ def result_of(
         judging=(all_evaluations - evaluations, all_jacobians - jacobians),
         warnings=warnings,
     )
+    return replace(result, estimates=told_to_rest(result))

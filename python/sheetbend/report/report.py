@@ -20,7 +20,8 @@ from .report_profiles import lopsided_profiles
 from .report_recordings import forces, held_out_motion, recordings
 from .report_shot import shot_motions
 from .report_starts import groups_of_starts, starts_note
-from .tables import Section, plain_section, rich_section
+from .resting import rests
+from .tables import Section, plain_section, rich_section, wide
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -31,6 +32,7 @@ CORRELATIONS_SHOWN = 15
 """Number of correlations that the report lists at most; fit.json has them all."""
 GROWTH_SHOWN = 10.0
 """Growth of small displacements from which on the report tells it."""
+IF_RIGHT = "if right to"  # how well given values must be known for an interval to hold
 _SHAKEN = 0.1  # of a half-width: less adds next to nothing to it
 
 
@@ -132,8 +134,16 @@ def _unsound(result: FitData) -> Section:
 def _parameters(result: FitData) -> Section:
     rows = [_estimate_row(estimate) for estimate in result.estimates]
     rows += [_given_row(given) for given in result.given]
-    headers = ("parameter", "value", "+/-", "95 % interval", "unit", "verdict")
-    return Section("Parameters", headers, tuple(rows), tuple(("intervals", words) for words in result.not_counted))
+    headers: tuple[str, ...] = ("parameter", "value", "+/-", "95 % interval", "unit", "verdict")
+    notes = [("intervals", words) for words in result.not_counted]
+    if on := rests(result):
+        beside = [(*row, on[row[0]].cell if row[0] in on else "") for row in rows]
+        if wide(((*headers, IF_RIGHT), *beside)):
+            shared = [name for name in on if not name.endswith("]")] or list(on)
+            notes.insert(0, ("verdicts hold if", "; ".join(f"{name}: {on[name].note}" for name in shared)))
+        else:
+            headers, rows = (*headers, IF_RIGHT), beside
+    return Section("Parameters", headers, tuple(rows), tuple(notes))
 
 
 def _estimate_row(estimate: Estimate) -> tuple[str, ...]:

@@ -7,7 +7,8 @@ from collections.abc import Callable, Sequence
 from ..quantities.wording import short
 from ..result.estimate import Estimate, Premise
 from ..result.result import FitData
-from .tables import Section
+from .resting import needed
+from .tables import Section, wide
 
 PREMISES_SHOWN = 8
 """Number of given values that the report lists at most, those with the strongest effects; fit.json has them all."""
@@ -26,7 +27,7 @@ def premises(result: FitData) -> Section:
 
     every = [p for p in result.premises if any(strength(p, e) > _FELT for e in closed)]
     every.sort(key=lambda p: -max(strength(p, e) for e in closed))
-    counted = any(p.sd for p in every)
+    counted, right_to = any(p.sd for p in every), needed(result)
     listed = []
     for p in every[:PREMISES_SHOWN]:
         value = "" if p.value is None else f"{short(p.value, 4)} {p.unit}".rstrip()
@@ -35,19 +36,18 @@ def premises(result: FitData) -> Section:
     ends = ("sd counted",) if counted else ()
     headers = ("given", "value", "if off by", *(e.name for e in closed), *ends)
     rows = [(*before, *(_moved(p, e) for e in closed), *after) for before, p, after in listed]
-    if len(closed) > PREMISE_COLUMNS or _wide((headers, *rows)):
+    if len(closed) > PREMISE_COLUMNS or wide((headers, *rows)):
         most = [max(closed, key=lambda e, p=p: strength(p, e)) for _, p, _ in listed]  # type: ignore[misc]
         headers = ("given", "value", "if off by", "moves most", "half-widths", *ends)
         rows = [
             (*before, f"{e.name} {_moved(p, e)}", short(strength(p, e), 2), *after)
             for (before, p, after), e in zip(listed, most, strict=True)
         ]
-    return Section("What the result rests on", headers, tuple(rows), _rests_on(every, closed, strength) if rows else ())
-
-
-def _wide(lines: Sequence[tuple[str, ...]]) -> bool:
-    """Whether a table does not fit a report."""
-    return sum(2 + max(map(len, column)) for column in zip(*lines, strict=True)) > 100
+    notes = _rests_on(every, closed, strength) if rows else ()
+    if right_to:
+        sizes = ", ".join(f"{p.name} {right_to[p.name]}" for p in every if p.name in right_to)
+        notes = (("right to", f"{sizes}. A larger error may move a parameter out of its interval unseen"), *notes)
+    return Section("What the result rests on", headers, tuple(rows), notes)
 
 
 def _moved(premise: Premise, e: Estimate) -> str:

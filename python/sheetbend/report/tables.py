@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from ..optional import require
@@ -56,6 +56,11 @@ def rich_section(section: Section) -> list[object]:
     return parts
 
 
+def wide(lines: Sequence[tuple[str, ...]], width: int = 100) -> bool:
+    """Whether a table of these lines, its headers first, is wider than a report."""
+    return sum(2 + max(map(len, column)) for column in zip(*lines, strict=True)) > width
+
+
 def _table(section: Section) -> list[str]:
     if not section.rows:
         return []
@@ -80,6 +85,7 @@ def flush_left(section: Section) -> list[bool]:
         "recording",
         "unit",
         "verdict",
+        "if right to",
         "step",
         "stays",
         "rope",

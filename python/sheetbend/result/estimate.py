@@ -77,6 +77,8 @@ class Premise:
         off_by: the error, in `unit`, whose effect is told; `words` says it, such as "1 %".
         moved: of each fitted parameter that is determined, in its unit, by that error (of several independent errors
             the root of the sum of squares).
+        leaves: what that error leaves in the residuals, which no parameter takes up: root of the sum of squares, in
+            sigma. 0 where the residuals are not asked for it.
         sd: its standard deviation in `unit`, which then counts in the intervals; None where none was given.
     """
 
@@ -87,6 +89,7 @@ class Premise:
     words: str
     moved: Mapping[str, float]
     sd: float | None = None
+    leaves: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

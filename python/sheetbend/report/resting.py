@@ -1,0 +1,119 @@
+"""Which given number, wrong by as much as it may well be, would move an estimate out of its interval without a trace.
+
+An error that leaves much in the residuals is named (doubts.wrong_given). So an error counts here up to the size from
+which on it would be.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from ..quantities.wording import short
+from ..result.estimate import Estimate, Premise
+from ..result.result import FitData
+
+LEVEL = 0.25
+"""Degrees by which a direction may well be wrong: what a spirit level or an eye along an edge leaves. Other numbers may
+be wrong by the error whose effect the report tells: 1 %, 1 mm, 1 ms."""
+STANDS = ("identified", "weak")
+NAMED = 0.85 / 0.15
+"""An error is named where it leaves so many times what else the fit leaves beyond noise (doubts.causes.MOST)."""
+SURELY = 2.0  # standard deviations of the sum of squares of noise, which nobody tells from what is left beyond it
+
+
+@dataclass(frozen=True)
+class Rests:
+    """What an estimate rests on: given numbers whose errors may move it by more than its half-width, and not be seen.
+
+    Attributes:
+        name: of the one that moves it the most.
+        size: how well that one has to be known for the interval to hold.
+        others: how many more there are.
+    """
+
+    name: str
+    size: str
+    others: int
+
+    @property
+    def cell(self) -> str:
+        """In a table."""
+        return f"{self.name} {self.size}{self._more}"
+
+    @property
+    def note(self) -> str:
+        """Below a table."""
+        return f"the error in {self.name} is below {self.size}{self._more}"
+
+    @property
+    def words(self) -> str:
+        """Behind a verdict."""
+        more = f" and {self.others} other given value{'s are' if self.others > 1 else ' is'} right too"
+        return f"if the error in {self.name} is below {self.size}{more if self.others else ''}"
+
+    @property
+    def _more(self) -> str:
+        return f", {self.others} more" if self.others else ""
+
+
+def rests(result: FitData) -> dict[str, Rests]:
+    """By estimate, what it rests on; without those that no such error moves so far, and those that do not stand."""
+    found = {}
+    for e in result.estimates:
+        far = list(_far(result, e))
+        if far:
+            _, off_by, most = max(far, key=lambda each: each[0])
+            found[e.name] = Rests(most.name, _size(most, off_by), len(far) - 1)
+    return found
+
+
+def needed(result: FitData) -> dict[str, str]:
+    """By given number that an estimate rests on, how well it has to be known for the intervals of all to hold."""
+    found: dict[str, tuple[float, Premise]] = {}
+    for e in result.estimates:
+        for _, off_by, p in _far(result, e):
+            found[p.name] = min((off_by, p), found.get(p.name, (math.inf, p)), key=lambda each: each[0])
+    return {name: _size(p, off_by) for name, (off_by, p) in found.items()}
+
+
+def told_to_rest(result: FitData) -> tuple[Estimate, ...]:
+    """The estimates, each with what it rests on in its words."""
+    found = rests(result)
+    return tuple(
+        replace(e, words=f"{e.words}, {found[e.name].words}") if e.name in found else e for e in result.estimates
+    )
+
+
+def _far(result: FitData, e: Estimate) -> Iterator[tuple[float, float, Premise]]:
+    """By how much each given number may move an estimate that stands, of those that may move it by more than its
+    half-width, and the error of it that moves it by just that."""
+    for p in result.premises if e.verdict in STANDS else ():
+        moves = abs(p.moved.get(e.name, 0.0)) / p.off_by
+        may = moves * min(_plausible(p), _unseen(result, p))
+        if p.sd is None and e.half_width and may > e.half_width:
+            yield may, e.half_width / moves, p
+
+
+def _plausible(premise: Premise) -> float:
+    """Error that may well be, in its unit."""
+    return math.radians(LEVEL) if premise.unit == "rad" else premise.off_by
+
+
+def _unseen(result: FitData, premise: Premise) -> float:
+    """Error up to which it is not surely named, in its unit."""
+    noise = 2.0 * result.cost / max(result.rows, 1)
+    alike = result.rows * (1.0 - 1.0 / max(result.autocorrelation_time, 1.0))
+    beyond = noise * max(SURELY * math.sqrt(2.0 * result.rows), alike)
+    return math.inf if premise.leaves == 0.0 else premise.off_by * math.sqrt(NAMED * beyond) / premise.leaves
+
+
+def _size(premise: Premise, error: float) -> str:
+    if premise.words == "1 %" and premise.value is not None:
+        return f"{short(100 * error / abs(premise.value), 2)} %"
+    if premise.unit == "rad":
+        return f"{short(math.degrees(error), 2)} degrees"
+    if premise.unit == "m":
+        return f"{short(1e3 * error, 2)} mm{' each' if premise.name == 'markers' else ''}"
+    return f"{short(error, 2)} {premise.unit}".rstrip()
