@@ -150,10 +150,9 @@ def _rest(recording: Recording, noise: float) -> float:
     t = recording.times - recording.times[0]
     if len(t) < 8 or not (t <= REST).sum() >= 4:
         return 0.0
-    filled = _filled(recording)
-    smooth, _ = smoothed(recording.times, np.nan_to_num(filled), REST / 2)
-    first = np.median(smooth[t <= REST / 2], axis=0)
-    off = np.where(np.isnan(filled), 0.0, smooth - first)
+    smooth, _ = _smooth(recording)
+    first = mean_position(smooth[t <= REST / 2])
+    off = np.nan_to_num(smooth - first)
     gone = np.flatnonzero((np.linalg.norm(off, axis=2) > CALM * noise).any(axis=1))
     return float(t[gone[0]] if len(gone) else t[-1])
 
@@ -162,16 +161,25 @@ def _speed(recording: Recording) -> float:
     """m/s; 0 for recordings that are too short to tell."""
     if len(recording.times) < 8:
         return 0.0
-    filled = _filled(recording)
-    _, rate = smoothed(recording.times, np.nan_to_num(filled), REST / 2)
-    size = np.where(np.isnan(filled[..., 0]), 0.0, np.linalg.norm(rate, axis=2))
+    _, rate = _smooth(recording)
+    size = np.nan_to_num(np.linalg.norm(rate, axis=2))
     return float(np.quantile(size.max(axis=1), 0.99))
 
 
-def _filled(recording: Recording) -> Array:
-    """Positions with short gaps closed."""
-    t = recording.times
-    return interpolate(t, recording.positions, t, "linear", default_max_gap(t))
+def _smooth(recording: Recording) -> tuple[Array, Array]:
+    """Smoothed positions and velocities; NaN where a marker is lost for longer than short gaps, and as near to such a
+    gap as the smoothing reaches."""
+    t, x = recording.times, recording.positions
+    known = np.isfinite(interpolate(t, x, t, "linear", default_max_gap(t))[..., 0])
+    whole = np.zeros_like(x)
+    for k in range(x.shape[1]):
+        seen = recording.mask[:, k]
+        whole[:, k] = np.stack([np.interp(t, t[seen], x[seen, k, axis]) for axis in range(3)], axis=1)
+    reach = round(REST / 2 / float(np.median(np.diff(t))))
+    lost = np.cumsum(np.pad(~known, ((reach + 1, reach), (0, 0))), axis=0)
+    known = lost[2 * reach + 1 :] == lost[: -2 * reach - 1]
+    value, rate = smoothed(t, whole, REST / 2)
+    return np.where(known[..., None], value, np.nan), np.where(known[..., None], rate, np.nan)
 
 
 def _up(recording: Recording) -> tuple[int, bool]:
