@@ -55,7 +55,9 @@ def _saved(folder: Path, suffix: str) -> bytes:
 def _csv(folder: Path) -> list[Files]:
     long = "time,marker,x,y,z\n" + "".join(f"{k // 3 / 100},m{k % 3},{k}.5,2,nan\n" for k in range(12))
     stamps = "# a remark\n%time\ta.x\ta.y\ta.z\n1700000000000000001\t1\t2\t3\n1700000000010000001\t\t\t\n"
-    texts = [_saved(folder, ".csv"), long.encode(), stamps.encode()]
+    commas = "Zeit [s];x1 [mm];y1 [mm];z1 [mm]\n0,00;1,5;2,25;3,0\n0,01;0,0;0,0;0,0\n"
+    poses = "%time,field.header.seq,field.a.position.x,field.a.position.y,field.a.position.z\n17,0,1,2,3\n"
+    texts = [_saved(folder, ".csv"), long.encode(), stamps.encode(), commas.encode(), poses.encode()]
     return [{"take.csv": text} for text in texts]
 
 
@@ -76,6 +78,11 @@ def _trc(folder: Path) -> list[Files]:
 def _npz(folder: Path) -> list[Files]:
     shipped = EXPERIMENTS / "wires" / "data" / "red_0.npz"
     return [{"take.npz": _saved(folder, ".npz")}, {"take.npz": shipped.read_bytes()}]
+
+
+def _npy(folder: Path) -> list[Files]:
+    np.save(folder / "take.npy", np.random.default_rng(1).normal(size=(4, 5, 3)))
+    return [{"take.npy": (folder / "take.npy").read_bytes(), "take.json": b'{"rate": 100}'}]
 
 
 def _pickles(folder: Path) -> list[Files]:
@@ -251,6 +258,7 @@ TARGETS: dict[str, Target] = {
     "mocap": Target(_mocap, _recording, mutated),
     "trc": Target(_trc, _recording, mutated),
     "npz": Target(_npz, _recording, packed),
+    "npy": Target(_npy, _recording, mutated),
     "pickle": Target(_pickles, _recording, mutated),
     "c3d": Target(_c3d, _recording, mutated),
     "json": Target(_sidecar, _beside, json_tree),

@@ -11,7 +11,7 @@ import pytest
 import sheetbend as sb
 from sheetbend.report.fit_result import FitResult
 from sheetbend.report.resting import Rests, rests, told_to_rest
-from sheetbend.result.result import Estimate, Premise
+from sheetbend.result.estimate import Estimate, Premise
 from test_contact_fit import SOLVER as DRAGGING
 from test_contact_fit import TIMES as DRAGGED
 from test_contact_fit import dragged

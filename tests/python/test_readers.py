@@ -135,7 +135,7 @@ def test_long_csv_columns_go_by_name(tmp_path: Path) -> None:
         ("time,a_x,a_y,a_z\n0,1,2,3\n1,1,2\n", r"line 3: must have 4 cells, like the header \(got 3\)"),
         ("time,a_x,a_y,a_z\n0,1,2,3\n1,1,2,3,4\n", "line 3: must have 4 cells"),
         ("#\ntime,a_x,a_y,a_z\n0,1,2,3\n\n1,one,2,3\n", r"line 5: holds a cell that is no number .*'one'"),
-        ("time;a_x;a_y;a_z\n0;1,5;2;3\n", "line 2: holds a cell that is no number .*point"),
+        ("time;a_x;a_y;a_z\n0;1,5;2.5;3\n", "line 2: holds a cell that is no number .*point"),
         ("time,a_x,a_y,a_z\n0,1_0,2,3\n", r"line 2: .* no number .*1_0"),
         ("time,a_x,a_y,a_z\n0,inf,2,3\n", "line 2: holds an infinite number"),
         ("time,a_x,a_y,a_z\n0,1,2,3\n,1,2,3\n", "line 3: must have a time later"),

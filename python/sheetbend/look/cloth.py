@@ -19,7 +19,7 @@ from .margin import margin, pitches
 from .seen import Seen
 from .sheet import flattened, placed, spacing
 from .slung import slack
-from .take import Description, Measured, Take
+from .take import Description, Measured, Take, max_gap
 from .text import joined, table
 
 Array = np.ndarray
@@ -208,7 +208,10 @@ def _lines(takes: Sequence[Take], sheets: Sequence[Sheet], density: float, measu
     for sheet in sheets:
         lines += _cloth(s, sheet, density)
     for take in takes:
-        lines += table("[[recording]]", _recording(take, sheets[0].ride))
+        own, r = _recording(take, sheets[0].ride), take.seen.recording
+        driving = [k for sheet in sheets for hold in sheet.held for k in hold.driving(s)]
+        own["max_gap"] = max_gap(r.times, r.mask[:, driving])
+        lines += table("[[recording]]", own, {"max_gap": "s, for which a marker of a grip is lost"})
     for sheet in sheets:
         lines += _parameters(sheet, density, s.static) + _guesses(sheet, measured, s.static)
     if winds:

@@ -56,6 +56,12 @@ class Hold:
         """The edge beyond the cloth's own row, where the motion shows it."""
         return None if self.margin is None else self.margin.edge
 
+    def driving(self, s: Seen) -> list[int]:
+        """The markers whose motion moves the cloth."""
+        if not self.moves or self.tool is not None:
+            return []
+        return list(self.markers) if self.corners else _without_gaps(s, self.markers)
+
     def tables(self, names: Sequence[str], s: Seen) -> tuple[list[Any], list[Any], list[Any]]:
         """Sets that are pinned, sets, and grips of a cloth."""
         if not self.corners:
@@ -63,7 +69,7 @@ class Hold:
                 return [self.side], [], []
             if self.tool is not None:
                 return [], [], [{"set": self.side, "tool": self.tool}]
-            return [], [], [{"set": self.side, "markers": [names[k] for k in _without_gaps(s, self.markers)]}]
+            return [], [], [{"set": self.side, "markers": [names[k] for k in self.driving(s)]}]
         by_set = {f"{self.side}_{j + 1}": [names[k]] for j, k in enumerate(self.markers)}
         sets = [{"name": name, "markers": markers} for name, markers in by_set.items()]
         if not self.moves:

@@ -89,8 +89,8 @@ def _told(takes: Sequence[Take], up: int | None) -> list[str]:
     said = []
     for take in takes:
         r = take.seen.recording
-        frames, markers = r.mask.shape
-        step = float(np.median(np.diff(r.times))) if frames > 1 else 0.0
+        markers = r.mask.shape[1]
+        step = _step(r.times)
         time = f"{r.times[-1] - r.times[0]:.3g} s at {1 / step:.4g} Hz" if step else "one frame"
         lost = float(np.mean(~r.mask))
         said.append(
@@ -112,6 +112,15 @@ def _told(takes: Sequence[Take], up: int | None) -> list[str]:
         axis = "xyz"[first.up]
         said.append(f"{axis} is taken as up, because the file does not say it: change `gravity` if another axis is up")
     return said
+
+
+def _step(times: np.ndarray) -> float:
+    """s between frames: the mean where they are even but for rounded times, else the median; 0 of one frame."""
+    if len(times) < 2:
+        return 0.0
+    steps = np.diff(times)
+    median = float(np.median(steps))
+    return float(steps.mean()) if steps.max() < 1.5 * median else median
 
 
 __all__ = ["Draft", "draft"]

@@ -11,7 +11,7 @@ import numpy as np
 from ..arrays.timeseries import mean_position
 from .hand import LEAD_SD, SHIFT_SD, TILT_SD, entry
 from .line import chain, plane, snapped, tangent
-from .seen import Seen
+from .seen import CALM, Seen, motion_of
 from .text import joined
 
 Array = np.ndarray
@@ -19,6 +19,10 @@ NAMES = ("hand", "grip", "wrist", "clamp", "robot", "holder", "finger")
 SMOOTHING, ALONE = 0.06, 0.12  # s, of recorded grips; of one that has one marker
 STIFF = 0.75  # of the next chord's: how much the direction at an end varies at most in a clamp; a pin has 1 or more
 NEAR = 1.5  # times the distance of neighbors on the rope: how near its first marker is to the second
+TURNS = 2.0  # times what it does move: how far a marker in a clamp would move if the rope turned there
+UNSURE = 0.6  # times the noise: so much motion cannot be told from it
+LEAST = 1e-4  # m, taken as the noise where there is less
+FIRST = 0.03  # s: an end that moves so much earlier than the other one moves the rope
 HIGHER = 0.1  # of the distance of the ends: so much higher is the one that holds the rope, where neither stays
 
 
@@ -99,7 +103,21 @@ def held(s: Seen, hand: tuple[int, ...], order: tuple[int, ...]) -> Held:
         k, way = ends[at], order if at == "start" else order[::-1]
         stays, along = _direction_stays(r.positions, way)
         direction = snapped(along if at == "start" else -along)
-        if k in still:
+        within = _clamped_until(s, way) if k in still else 0
+        if within:
+            outward = r.positions[:, way[within]] - r.positions[:, k]
+            outward = np.nanmean(outward, axis=0) / np.linalg.norm(np.nanmean(outward, axis=0))
+            found.rope[f"clamp_{at}"] = snapped(outward if at == "start" else -outward)
+            found.order = tuple(j for j in found.order if j not in way[:within])
+            found.notes.append(
+                f"{joined(names[j] for j in way[: within + 1])} stay in place: a clamp, and the rope is free from "
+                f"{names[way[within]]} on"
+            )
+            found.unknown.append(
+                f"where the clamp ends: the rope is taken to be free from {names[way[within]]} on. EI goes with the "
+                "third or fourth power of the free length: measure from where the clamp ends, and correct `markers`"
+            )
+        elif k in still:
             if stays:
                 found.rope[f"clamp_{at}"] = direction
                 found.notes.append(f"{names[k]} stays in place and the rope keeps its direction there: a clamp")
@@ -132,6 +150,19 @@ def held(s: Seen, hand: tuple[int, ...], order: tuple[int, ...]) -> Held:
             found.grips.append(grip)
     _clamp_angles(s, found)
     return found
+
+
+def _clamped_until(s: Seen, way: tuple[int, ...]) -> int:
+    """How many markers after the first one at an end stay too, where they would move if the rope turned there."""
+    x = s.recording.positions
+    moved = np.sqrt(np.maximum(np.nansum(np.nanvar(x[:, list(way)], axis=0), axis=1) - 3.0 * s.noise**2, 0.0))
+    within = 0
+    while within + 3 < len(way) and way[within + 1] in s.still:
+        within += 1
+    if not within:
+        return 0
+    turning = moved[within + 1] * s.apart[way[0], way[within]] / s.apart[way[0], way[within + 1]]
+    return within if turning > TURNS * max(moved[within], UNSURE * s.noise) else 0
 
 
 def _clamp_angles(s: Seen, found: Held) -> None:
@@ -177,8 +208,18 @@ def _of_hand(s: Seen, hand: tuple[int, ...], found: Held) -> str:
 
 
 def _guessed(s: Seen, found: Held) -> str:
-    """The end that is taken as the held one where none stays: the upper one, or the one that moves less."""
+    """The end that is taken as the held one where none stays: the one that moves first, the upper one, or the one that
+    moves less."""
     r, (first, last) = s.recording, (found.order[0], found.order[-1])
+    starts = [_leaves(s, k) for k in (first, last)]
+    if s.rest and abs(starts[0] - starts[1]) > FIRST:
+        at, k = ("start", first) if starts[0] < starts[1] else ("end", last)
+        found.notes.append(f"{r.markers[k]} is the end that moves first")
+        found.unknown.append(
+            f"what holds the rope: no marker stays or has a name such as hand or grip, so {r.markers[k]}, the end that "
+            "moves first, is taken"
+        )
+        return at
     height = mean_position(r.positions) @ (-s.gravity / np.linalg.norm(s.gravity))
     rise = height[first] - height[last]
     if abs(rise) > HIGHER * float(s.apart[first, last]):
@@ -191,6 +232,15 @@ def _guessed(s: Seen, found: Held) -> str:
         f"what holds the rope: no marker stays or has a name such as hand or grip, so {r.markers[k]}, {why}, is taken"
     )
     return at
+
+
+def _leaves(s: Seen, k: int) -> float:
+    """s, when a marker leaves where it was while all rested."""
+    t = s.recording.times - s.recording.times[0]
+    x, _ = motion_of(s.recording)
+    off = np.linalg.norm(x[:, k] - mean_position(x[t <= 0.5 * s.rest])[k], axis=1)
+    gone = np.flatnonzero(np.nan_to_num(off) > CALM * max(s.noise, LEAST))
+    return float(t[gone[0]]) if len(gone) else float("inf")
 
 
 def _direction_stays(x: Array, order: tuple[int, ...]) -> tuple[bool, Array]:

@@ -30,17 +30,27 @@ def chain(apart: Array, markers: tuple[int, ...]) -> tuple[int, ...]:
     return best
 
 
+def tree(apart: Array, markers: tuple[int, ...]) -> tuple[dict[int, set[int]], float]:
+    """The shortest tree through markers, as the neighbors of each, and its length (Prim 1957, Bell Syst. Tech. J. 36,
+    1389)."""
+    found: dict[int, set[int]] = {markers[0]: set()}
+    nearest = {k: (float(apart[markers[0], k]), markers[0]) for k in markers[1:]}
+    total = 0.0
+    while nearest:
+        b = min(nearest, key=lambda k: nearest[k])
+        distance, a = nearest.pop(b)
+        found[a].add(b)
+        found[b] = {a}
+        total += distance
+        nearest = {k: min(near, (float(apart[b, k]), b)) for k, near in nearest.items()}
+    return found, total
+
+
 def forks(apart: Array, order: tuple[int, ...]) -> tuple[list[int], float]:
     """Markers at which the shortest tree through all of them has three arms of two or more, and the length of the line
-    through the markers in order, in lengths of this tree (Prim 1957, Bell Syst. Tech. J. 36, 1389)."""
-    tree: dict[int, set[int]] = {order[0]: set()}
-    total = 0.0
-    while len(tree) < len(order):
-        distance, a, b = min((float(apart[a, b]), a, b) for a in tree for b in order if b not in tree)
-        tree[a].add(b)
-        tree[b] = {a}
-        total += distance
-    at = [k for k, near in tree.items() if sum(len(tree[j]) > 1 for j in near) >= 3]
+    through the markers in order, in lengths of this tree."""
+    neighbors, total = tree(apart, order)
+    at = [k for k, near in neighbors.items() if sum(len(neighbors[j]) > 1 for j in near) >= 3]
     return at, sum(float(apart[a, b]) for a, b in pairwise(order)) / max(total, 1e-300)
 
 

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from ..arrays.timeseries import default_max_gap, mean_position
+from ..arrays.timeseries import mean_position
 from ..errors import RecordingError
 from .held import Held, gripping, held, parts
 from .line import forks, plane, snapped, tangent
 from .seen import Seen
-from .take import Description, Measured, Take
+from .take import Description, Measured, Take, max_gap
 from .text import joined, table
+from .unseen import free_from
 
 Array = np.ndarray
 SUBSTEP = 1 / 500  # s, at most
 BENDING = 0.15  # of the length: bending length (EI/(density g))^(1/3) at the start
-GAP = 0.1  # s, for which a marker of a grip may be lost
 EARLY = 0.05  # s, in which the speed at the first frame is looked for
 SEGMENTS = 40  # of a rope, at least
 BRANCHED = 1.1  # times the shortest tree: how much longer the line through all markers of a branched cable is
@@ -30,6 +31,7 @@ SET_MODES, SET_SD = (1, 2, 3, 4), 10.0  # of the rest curvature of shapes at res
 ROUND = 0.75  # GJ/EI of a round solid section with a Poisson ratio of 1/3
 LEAST_SIGMA = 1e-4  # m, of the markers of a motion: a model misses by as much
 NUMBERS = 1500  # of a hand's motion, three for every fitted frame: so many are estimated in minutes
+LEAST_FREE = 0.2  # of a recording: how much is left at least where its beginning is cut off
 HOLDER_SD = 0.5  # rad, of a clamp of a shape at rest, read off the markers of the same shape
 
 TWIST = (
@@ -64,6 +66,10 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     found = _at_rest(s, order) if s.static else held(s, hand, order)
     if len(found.order) < 3:
         return None
+    pushed = None
+    if s.rest and not s.static and not found.grips and len(takes) == 1:
+        takes, pushed = _free(takes[0], found)
+        s, r = takes[0].seen, takes[0].seen.recording
     arc = _arcs(takes, found.order)
     if found.grips and found.grips[0]["at"] == "start":
         arc = arc + found.lead
@@ -102,7 +108,8 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
                 rope |= _without_spin(s, found)
                 why["hold_roll"] = "the hand lets it turn, but not spin about its own axis"
                 unknown.append(SPIN)
-        notes += _beginning(s, found, rope, kind == "rod")
+        begins = _beginning(s, found, rope, kind == "rod")
+        notes += begins if pushed is None else [pushed]
     lines = [] if r.gravity is not None else table("[scene]", {"gravity": s.gravity.tolist()})
     if not s.static:
         step = float(np.median(np.diff(r.times)))
@@ -115,7 +122,9 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         lines += table(f"[[scene.{kind}.grip]]", grip | ({"smoothing": 0.0} if estimated else {}))
     for take in takes:
         own = _recording(take, flat, "points" in rope) | {"driven_sigma": "estimate" if estimated else None}
-        own["max_gap"] = _max_gap(take, found)
+        r = take.seen.recording
+        driving = [r.markers.index(name) for grip in found.grips for name in grip["markers"]]
+        own["max_gap"] = max_gap(r.times, r.mask[:, driving])
         why = {
             "driven_sigma": "the fit estimates the hand's true motion",
             "held_out": "predicted, not fitted",
@@ -149,6 +158,24 @@ def _unbranched(s: Seen, order: tuple[int, ...]) -> None:
             f"branches near {joined(s.recording.markers[k] for k in at)}",
             "give a recording of one branch, or write one [[scene.rod]] for each, see docs/configuration.md",
         )
+
+
+def _free(take: Take, found: Held) -> tuple[list[Take], str | None]:
+    """The part of a recording in which a rope moves freely that rested before, though nothing that holds it moves, and
+    what is said of it."""
+    s, r = take.seen, take.seen.recording
+    start = free_from(r, s.rest, found.order)
+    if start + LEAST_FREE * float(r.times[-1] - r.times[0]) > r.times[-1]:
+        return [take], None
+    found.unknown.append(
+        f"whether anything still touches the rope after {start:.4g} s. If so, let `fit` in [[recording]] begin later"
+    )
+    said = (
+        f"it rests for the first {s.rest:.2g} s and then moves, though what holds it stays: something that no marker "
+        f"shows pushes it, or bends it and lets go. The fit begins at {start:.4g} s, where it moves fastest for the "
+        "first time, with the places and speeds of the markers"
+    )
+    return [replace(take, seen=replace(s, recording=r.piece(start), rest=0.0))], said
 
 
 def _at_rest(s: Seen, order: tuple[int, ...]) -> Held:
@@ -328,14 +355,6 @@ def _last_fitted(take: Take) -> float:
     s, times = take.seen, take.seen.recording.times
     start, stop = float(times[0]), float(times[-1])
     return round(start + s.rest + min(FITTED * (stop - start - s.rest), LONGEST), 4)
-
-
-def _max_gap(take: Take, found: Held) -> float | None:
-    """s, where a marker of a grip is lost for longer than is closed by default, and not for too long."""
-    r = take.seen.recording
-    markers = [r.markers.index(name) for grip in found.grips for name in grip["markers"]]
-    longest = max((float(np.diff(r.times[r.mask[:, k]], prepend=r.times[0]).max()) for k in markers), default=0.0)
-    return round(longest + 1e-3, 4) if default_max_gap(r.times) < longest <= GAP else None
 
 
 def _parameters(static: bool, density: float, length: float, angles: bool, rod: bool) -> dict[str, dict[str, Any]]:

@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays.smoothing import smoothed
 from ..arrays.timeseries import default_max_gap, interpolate, mean_position
 from ..recording.recording import Recording
-from .line import chain
+from .line import chain, tree
 
 Array = np.ndarray
 EARTH = 9.81
@@ -23,6 +23,7 @@ REST = 0.15  # s that a recording must begin at rest to be called so
 NEAR = 1.9  # times the nearest neighbor's distance: markers of a sheet have more than two others so near
 SHARP, TURNS = 0.15, 3  # share of markers at which the shortest way through those of a sheet turns back, and how many
 SHEET, FEWEST_OF_SHEET = 2.7, 8  # others so near, on average, of a sheet; markers that make one
+BROAD, FEWEST_BROAD = 0.4, 12  # of the shortest tree: the largest distance is less on a sheet; markers that tell it
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,10 +151,9 @@ def _rest(recording: Recording, noise: float) -> float:
     t = recording.times - recording.times[0]
     if len(t) < 8 or not (t <= REST).sum() >= 4:
         return 0.0
-    filled = _filled(recording)
-    smooth, _ = smoothed(recording.times, np.nan_to_num(filled), REST / 2)
-    first = np.median(smooth[t <= REST / 2], axis=0)
-    off = np.where(np.isnan(filled), 0.0, smooth - first)
+    smooth, _ = motion_of(recording)
+    first = mean_position(smooth[t <= REST / 2])
+    off = np.nan_to_num(smooth - first)
     gone = np.flatnonzero((np.linalg.norm(off, axis=2) > CALM * noise).any(axis=1))
     return float(t[gone[0]] if len(gone) else t[-1])
 
@@ -162,16 +162,25 @@ def _speed(recording: Recording) -> float:
     """m/s; 0 for recordings that are too short to tell."""
     if len(recording.times) < 8:
         return 0.0
-    filled = _filled(recording)
-    _, rate = smoothed(recording.times, np.nan_to_num(filled), REST / 2)
-    size = np.where(np.isnan(filled[..., 0]), 0.0, np.linalg.norm(rate, axis=2))
+    _, rate = motion_of(recording)
+    size = np.nan_to_num(np.linalg.norm(rate, axis=2))
     return float(np.quantile(size.max(axis=1), 0.99))
 
 
-def _filled(recording: Recording) -> Array:
-    """Positions with short gaps closed."""
-    t = recording.times
-    return interpolate(t, recording.positions, t, "linear", default_max_gap(t))
+def motion_of(recording: Recording) -> tuple[Array, Array]:
+    """Smoothed positions and velocities; NaN where a marker is lost for longer than short gaps, and as near to such a
+    gap as the smoothing reaches."""
+    t, x = recording.times, recording.positions
+    known = np.isfinite(interpolate(t, x, t, "linear", default_max_gap(t))[..., 0])
+    whole = np.zeros_like(x)
+    for k in range(x.shape[1]):
+        seen = recording.mask[:, k]
+        whole[:, k] = np.stack([np.interp(t, t[seen], x[seen, k, axis]) for axis in range(3)], axis=1)
+    reach = round(REST / 2 / float(np.median(np.diff(t))))
+    lost = np.cumsum(np.pad(~known, ((reach + 1, reach), (0, 0))), axis=0)
+    known = lost[2 * reach + 1 :] == lost[: -2 * reach - 1]
+    value, rate = smoothed(t, whole, REST / 2)
+    return np.where(known[..., None], value, np.nan), np.where(known[..., None], rate, np.nan)
 
 
 def _up(recording: Recording) -> tuple[int, bool]:
@@ -195,7 +204,10 @@ def _is_sheet(x: Array, apart: Array, in_bodies: set[int]) -> bool:
     nearest = np.median(d.min(axis=1))
     if (d < NEAR * nearest).sum(axis=1).mean() > SHEET:
         return True
+    everyone = tuple(range(len(apart)))
+    if len(apart) >= FEWEST_BROAD and apart.max() < BROAD * tree(apart, everyone)[1]:  # rows far apart
+        return True
     fullest = int(np.argmax((~np.isnan(x[:, :, 0])).sum(axis=1)))
-    way = np.diff(x[fullest, list(chain(apart, tuple(range(len(apart)))))], axis=0)
+    way = np.diff(x[fullest, list(chain(apart, everyone))], axis=0)
     back = np.sum(way[1:] * way[:-1], axis=1) < 0.0
     return bool(back.sum() >= TURNS and back.mean() > SHARP)

@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
+from ..arrays.timeseries import default_max_gap
 from .robot import Poses
 from .seen import Seen
 
@@ -49,3 +52,13 @@ class Description(NamedTuple):
     unknown: list[str]
     lines: list[str]
     up: int | None = None
+
+
+GAP = 0.1  # s, for which a marker that moves something may be lost
+
+
+def max_gap(times: np.ndarray, seen: np.ndarray) -> float | None:
+    """s, the `max_gap` that a configuration needs where markers (frames, k) that move something are lost for longer
+    than is closed by default, and not for too long."""
+    longest = max((float(np.diff(times[own], prepend=times[0]).max()) for own in seen.T), default=0.0)
+    return round(longest + 1e-3, 4) if default_max_gap(times) < longest <= GAP else None

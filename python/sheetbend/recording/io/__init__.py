@@ -18,7 +18,7 @@ from ...files.door import reading
 from ...files.whole import written
 from ..marker_data import MarkerData
 from ..recording_checks import check_seen
-from . import c3d, csv, deform, mesh_sequence, npz, sidecar, trc
+from . import c3d, csv, deform, mesh_sequence, npy, npz, sidecar, trc
 
 FORMATS: dict[str, ModuleType] = {
     ".npz": npz,
@@ -27,6 +27,9 @@ FORMATS: dict[str, ModuleType] = {
     ".trc": trc,
     ".pkl": deform,
     ".pickle": deform,
+    ".npy": npy,
+    ".tsv": csv,
+    ".txt": csv,
 }
 
 

@@ -12,7 +12,8 @@ import numpy as np
 from ...arrays.timeseries import Array
 from .cells import Row, number, refuse
 
-_NAME = re.compile(r"(%time)|(?:time|timestamp|t)[\s_]*[(\[]?\s*(s|sec|seconds|ms|us|ns)?\s*[)\]]?", re.IGNORECASE)
+_WORDS = "time|timestamp|t|zeit|temps|tiempo|tempo|tijd|czas|время|时间|時間"
+_NAME = re.compile(rf"(%time)|(?:{_WORDS})[\s_/]*[(\[]?\s*(s|sec|seconds|ms|us|ns)?\s*[)\]]?", re.IGNORECASE)
 _LONGEST = 40  # characters: blanks of a longer one would be matched in ever more ways
 _PER_SECOND = {"ms": 10**3, "us": 10**6, "ns": 10**9}
 _LATEST = 1e11  # s: later than any clock that counts seconds

@@ -14,11 +14,12 @@ Long, one row per marker and frame, in any order; a missing row means not seen:
     0.00,base,0.0,0.0,0.0
 
 The header is required and starts with `time` or `t` (s), `time_ms`, `time_us` or `time_ns`; the last three count from
-the first row. A column `frame` before it is not read. Between marker and axis stands an underscore, a point, a colon or
-a blank. Cells are separated by commas, semicolons
-or tabs, with a point as decimal mark. An empty cell or `nan` is a marker not seen. Lines that start with # are
-comments.
-Coordinates are in the length unit of the JSON beside the file, meters without one.
+the first row. A column `frame`, or one without a name, before it is not read; without a time, the frames count at the
+`rate` of the JSON beside the file. `columns` says how markers and axes are written. Cells are separated by commas,
+semicolons or tabs. The decimal mark is a point, or a comma where no cell has a point and commas do not separate cells.
+An empty cell or `nan` is a marker not seen, and so is exactly 0, 0, 0 where a marker is otherwise far from there. Lines
+that start with # are comments. Coordinates are in the length unit of the header, `tip_x [mm]`, or of the JSON beside
+the file, meters without one.
 """
 
 from __future__ import annotations
@@ -34,14 +35,14 @@ from ...errors import RecordingError
 from ...files.door import check_room
 from ...files.whole import written
 from ..marker_data import MarkerData
-from . import clock, motive, motive_rows, vicon
+from . import clock, columns, motive, motive_rows, sidecar, vicon
 from .cells import Row, lines, number, refuse, split
+from .lost import without_zeros
 
 _DELIMITERS = (",", ";", "\t")
-_AXES = ("x", "y", "z")
-_COLUMNS = "name the columns of each marker <marker>_x, <marker>_y, <marker>_z"
-_FRAME = re.compile(r"frames?|frame[_ ]?(?:#|no|nr|number|index|id)?", re.IGNORECASE)
-_AXIS = re.compile(r"(.*)[_.: ]([xyz])", re.IGNORECASE | re.DOTALL)
+_AXES = columns.AXES
+_FRAME = re.compile(r"frames?|frame[_ ]?(?:#|no|nr|number|index|id)?|index|", re.IGNORECASE)
+_DECIMAL_COMMA = re.compile(r"([+-]?\d*),(\d+(?:[eE][+-]?\d+)?)")
 
 
 def read(path: Path) -> MarkerData:
@@ -61,7 +62,8 @@ def read(path: Path) -> MarkerData:
     for line, cells in rows:
         if len(cells) != len(header):
             refuse(path, line, f"must have {len(header)} cells, like the header", len(cells))
-    times = clock.times(path, rows, clock.unit(header[0]) or "s")
+    told = clock.unit(header[0])
+    times = _counted(path, rows) if told is None else clock.times(path, rows, told)
     if sorted(header[1:]) == ["marker", *_AXES]:
         return _read_long(path, header, rows, times)
     return _read_wide(path, header, header_line, rows, times)
@@ -78,41 +80,62 @@ def write(recording: MarkerData, path: Path) -> None:
 
 
 def _rows(path: Path, text: list[tuple[int, str]]) -> list[Row]:
-    """Header and rows as stripped cells, without comments and blank lines."""
+    """Header and rows as stripped cells, without comments, blank lines and the column before the time."""
     kept = [(number, line) for number, line in text if line.strip() and not line.lstrip().startswith("#")]
     if not kept:
         fix = "start with a header, time,<marker>_x,..."
         raise RecordingError(str(path), "holds no header", "only blank lines and comments", fix)
     delimiter = _delimiter(path, *kept[0])
     rows = [(number, split(path, number, line, delimiter)) for number, line in kept]
-    if _FRAME.fullmatch(rows[0][1][0]):
-        return [(number, cells[1:]) for number, cells in rows]
-    return rows
+    if len(rows[0][1]) > 1 and all(len(cells) == len(rows[0][1]) and not cells[-1] for _, cells in rows):
+        rows = [(number, cells[:-1]) for number, cells in rows]  # lines end in a delimiter
+    if len(rows[0][1]) > 1 and _before_time(rows[0][1]):
+        rows = [(number, cells[1:]) for number, cells in rows]
+    return rows if delimiter == "," else _with_points(rows)
+
+
+def _with_points(rows: list[Row]) -> list[Row]:
+    """Rows whose numbers have a point as decimal mark, where all of them had a comma."""
+    header, *below = rows
+    if any("." in cell for _, cells in below for cell in cells):
+        return rows
+    return [header, *((line, [_DECIMAL_COMMA.sub(r"\1.\2", cell) for cell in cells]) for line, cells in below)]
+
+
+def _before_time(header: list[str]) -> bool:
+    return _FRAME.fullmatch(header[0]) is not None and clock.unit(header[1]) is not None
 
 
 def _delimiter(path: Path, number: int, header: str) -> str:
-    """The one with which the header begins with the name of a time, or with a frame and a time."""
+    """The one with which the header begins with the name of a time, or with a frame, whose `rate` the JSON tells."""
+    counts = False
     for delimiter in _DELIMITERS:
         cells = split(path, number, header, delimiter) if delimiter in header else [""]
-        if clock.unit(cells[1 if _FRAME.fullmatch(cells[0]) else 0]) is not None:
+        if clock.unit(cells[0]) is not None or (len(cells) > 1 and _before_time(cells)):
+            return delimiter
+        counts |= len(cells) > 1 and _FRAME.fullmatch(cells[0]) is not None
+        if counts and "rate" in sidecar.beside(path):
             return delimiter
     fix = "start with time,<marker>_x,<marker>_y,<marker>_z,... or time,marker,x,y,z"
+    if counts:
+        beside = path.with_suffix(".json").name
+        fix = f'give a column of times, or write {{"rate": 100}} with the frames per second into {beside}'
     raise RecordingError(f"{path}, line {number}", "must be a header whose first column is time", header, fix)
 
 
+def _counted(path: Path, rows: list[Row]) -> Array:
+    """(rows,) s, of frames that count at the rate that the JSON tells."""
+    count = np.array([number(path, line, cells[0]) for line, cells in rows])
+    return (count - count[0]) / sidecar.rate(sidecar.beside(path)["rate"])
+
+
 def _read_wide(path: Path, header: list[str], header_line: int, rows: list[Row], times: Array) -> MarkerData:
-    markers = []
-    for k, column in enumerate(header[1:]):
-        match, axis = _AXIS.fullmatch(column), _AXES[k % 3]
-        if k % 3 == 0:
-            markers.append(match[1] if match else column)
-        if match is None or match[1] != markers[-1] or match[2].lower() != axis:
-            refuse(path, header_line, f"must have the column {f'{markers[-1]}_{axis}'!r} there", column, _COLUMNS)
-    if len(header) != 1 + 3 * len(markers):
-        refuse(path, header_line, "must have three columns x, y, z per marker", header[-1], _COLUMNS)
+    own = [k for k, name in enumerate(header) if k and not columns.beside(name)]
+    markers, unit = columns.markers(path, header_line, [header[k] for k in own])
     _check_times(path, rows, times)
-    table = np.array([[number(path, line, cell) for cell in cells[1:]] for line, cells in rows])
-    return MarkerData(table.reshape(len(rows), -1, 3), times, tuple(markers))
+    table = np.array([[number(path, line, cells[k]) for k in own] for line, cells in rows])
+    metadata = {} if unit is None else {"units": unit}
+    return MarkerData(without_zeros(table.reshape(len(rows), -1, 3)), times, tuple(markers), metadata=metadata)
 
 
 def _read_long(path: Path, header: list[str], rows: list[Row], times: Array) -> MarkerData:
@@ -134,7 +157,7 @@ def _read_long(path: Path, header: list[str], rows: list[Row], times: Array) -> 
         if earlier != line:
             refuse(path, line, f"repeats marker {marker!r} at the time of line {earlier}", cells[0])
         positions[frame, marker_of[marker]] = [number(path, line, cells[column[axis]]) for axis in _AXES]
-    return MarkerData(positions, frames, tuple(markers))
+    return MarkerData(without_zeros(positions), frames, tuple(markers))
 
 
 def _check_times(path: Path, rows: list[Row], times: Array) -> None:

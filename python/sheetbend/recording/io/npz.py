@@ -87,6 +87,19 @@ def plain_arrays(
         return {key: _array(archive, info, path, key) for key, info in wanted.items()}
 
 
+def single_array(path: Path) -> np.ndarray:
+    """The array of an NPY file.
+
+    Raises:
+        RecordingError: it is none, is damaged, or does not hold plain numbers.
+    """
+    try:
+        return _unpacked(path.read_bytes())
+    except _DAMAGE as error:
+        fix = "write it with numpy.save, of plain numbers"
+        raise RecordingError(str(path), "is no NPY file, or a damaged one", str(error), fix) from error
+
+
 def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path, key: str) -> np.ndarray:
     try:
         if info.compress_type not in _PACKED:

@@ -154,10 +154,18 @@ def _meters(units: Any) -> float:
 def _times(recording: MarkerData, beside: dict[str, Any]) -> Array:
     if "rate" not in beside:
         return recording.times
-    rate = beside["rate"]
-    if isinstance(rate, bool) or not isinstance(rate, int | float) or not 0 < rate < _FASTEST:
-        raise RecordingError("rate", "must be a positive number", rate, "give the frames per second in Hz")
-    return np.arange(len(recording.times)) / rate
+    return np.arange(len(recording.times)) / rate(beside["rate"])
+
+
+def rate(told: Any) -> float:
+    """The frames per second that the JSON tells, Hz.
+
+    Raises:
+        RecordingError: it is no positive number.
+    """
+    if isinstance(told, bool) or not isinstance(told, int | float) or not 0 < told < _FASTEST:
+        raise RecordingError("rate", "must be a positive number", told, "give the frames per second in Hz")
+    return float(told)
 
 
 def _rate(recording: MarkerData) -> float:

@@ -1,0 +1,87 @@
+"""Names of columns as people write them: the marker, the axis and the length unit in `tip_x`, `x1`, `M1 X [mm]`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from ...files.units import METERS
+from .cells import refuse
+
+AXES = ("x", "y", "z")
+FIX = "name the columns of each marker <marker>_x, <marker>_y, <marker>_z"
+_LONGEST = 200  # characters of a name
+_UNIT = re.compile(
+    r"(.*[^\s\[(])[\s_]*[\[(]\s*(mm|cm|m)\s*[\])]|(.*[_. ]?[xyz]\d*)[_ ](mm|cm|m)", re.IGNORECASE | re.DOTALL
+)
+_WAYS = (
+    re.compile(r"(?P<marker>.*)[_.: -](?P<axis>[xyz])", re.IGNORECASE | re.DOTALL),
+    re.compile(r"(?P<axis>[xyz])[_.: -]?(?P<marker>.*)", re.IGNORECASE | re.DOTALL),
+    re.compile(r"(?P<marker>.*\d)(?P<axis>[xyz])", re.IGNORECASE | re.DOTALL),
+)
+_OF_ROS = re.compile(r"(?:field\.)?(.+?)\.(?:pose\.)?(?:position|point|translation)\.[xyz]", re.DOTALL)
+_BESIDE = re.compile(r"(?:.*\.)?(?:orientation|rotation)\.[xyzw]|(?:field\.)?header\..*", re.DOTALL)
+_TURNS = {"qx", "qy", "qz", "qw"}
+
+
+def beside(name: str) -> bool:
+    """Whether a column holds what ROS writes beside places: a rotation, a header, a frame's name."""
+    return len(name) <= _LONGEST and _BESIDE.fullmatch(name) is not None
+
+
+def markers(path: Path, line: int, names: Sequence[str]) -> tuple[list[str], str | None]:
+    """The markers whose x, y, z stand in columns of these names, and their length unit where the names tell it.
+
+    Raises:
+        RecordingError: three columns in a row are not x, y, z of one marker, or the units differ.
+    """
+    if {name.lower() for name in names} >= _TURNS:
+        fix = "they go with a cloth: sheetbend new cloth.csv --poses, or `[[scene.tool]]`; see docs/recordings.md"
+        refuse(path, line, "names the poses of a body, and no markers", list(names), fix)
+    pairs = [_without_unit(name) for name in names]
+    told = {unit for _, unit in pairs}
+    if len(told) > 1:
+        got = sorted("none" if unit is None else unit for unit in told)
+        refuse(path, line, "must name one length unit in all columns", got, "write it in every column, or in none")
+    found = []
+    for k in range(0, len(pairs), 3):
+        three = [name for name, _ in pairs[k : k + 3]]
+        marker = next((one for way in _WAYS if (one := _marker(way, three)) is not None), None)
+        if marker is None:
+            _refuse_three(path, line, three)
+        match = _OF_ROS.fullmatch(three[0]) if len(three[0]) <= _LONGEST else None
+        found.append(match[1] if match else marker)
+    return found, told.pop() if told else None
+
+
+def _without_unit(name: str) -> tuple[str, str | None]:
+    match = _UNIT.fullmatch(name) if len(name) <= _LONGEST else None
+    if match is None:
+        return name, None
+    unit = (match[2] or match[4]).lower()
+    return (match[1] or match[3]).strip(), unit if unit in METERS else None
+
+
+def _marker(way: re.Pattern[str], names: Sequence[str]) -> str | None:
+    """The marker whose x, y, z these are, in this way of writing; None where they are not."""
+    matches = [way.fullmatch(name) for name in names]
+    if len(names) < 3 or any(match is None for match in matches):
+        return None
+    axes = [match["axis"].lower() for match in matches if match]
+    stems = {match["marker"] for match in matches if match}
+    if axes != list(AXES) or len(stems) > 1:
+        return None
+    stem = stems.pop()
+    return f"m{stem}" if way is not _WAYS[0] and (not stem or stem.isdigit()) else stem  # a number is no name
+
+
+def _refuse_three(path: Path, line: int, names: Sequence[str]) -> NoReturn:
+    first = _WAYS[0].fullmatch(names[0])
+    marker = first["marker"] if first and first["axis"].lower() == "x" else names[0]
+    wanted = [f"{marker}_{axis}" for axis in AXES]
+    for name, want in zip(names, wanted, strict=False):
+        if name != want:
+            refuse(path, line, f"must have the column {want!r} there", name, FIX)
+    refuse(path, line, "must have three columns x, y, z per marker", names[-1], FIX)

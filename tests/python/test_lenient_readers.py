@@ -1,0 +1,135 @@
+"""Recordings as laboratories write them: other names, units and decimal marks, lost markers at zero, arrays alone."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sheetbend import Recording, RecordingError
+
+X = np.round(np.random.default_rng(0).normal(size=(4, 2, 3)), 3)
+TIMES = [0.0, 0.01, 0.02, 0.03]
+
+
+def table(header: str, rows: list[list[float]], delimiter: str = ",", comma: bool = False) -> str:
+    text = [delimiter.join(f"{v}".replace(".", "," if comma else ".") for v in row) for row in rows]
+    return "\n".join([header, *text]) + "\n"
+
+
+def rows(extra: int = 0) -> list[list[float]]:
+    """Times, `extra` further cells, and the places."""
+    return [[t, *[7.0] * extra, *frame.ravel().tolist()] for t, frame in zip(TIMES, X, strict=True)]
+
+
+@pytest.mark.parametrize(
+    ("header", "markers", "scale"),
+    [
+        ("t,x1,y1,z1,x2,y2,z2", ("m1", "m2"), 1.0),
+        ("t,1x,1y,1z,2x,2y,2z", ("m1", "m2"), 1.0),
+        ("time,M1_X (mm),M1_Y (mm),M1_Z (mm),M2_X (mm),M2_Y (mm),M2_Z (mm)", ("M1", "M2"), 1e-3),
+        ("time,a_x_cm,a_y_cm,a_z_cm,b_x_cm,b_y_cm,b_z_cm", ("a", "b"), 1e-2),
+        ("Temps [s],X_a,Y_a,Z_a,X_b,Y_b,Z_b", ("a", "b"), 1.0),
+    ],
+)
+def test_columns_as_people_name_them(tmp_path: Path, header: str, markers: tuple, scale: float) -> None:
+    """`x1` was refused, and so were units and times in other languages."""
+    (tmp_path / "take.csv").write_text(table(header, rows()))
+    got = Recording.load(tmp_path / "take.csv")
+    assert got.markers == markers
+    assert np.allclose(got.positions, scale * X, rtol=0, atol=1e-15)
+    assert got.times.tolist() == TIMES
+
+
+def test_semicolons_and_decimal_commas(tmp_path: Path) -> None:
+    header = "Zeit [s];a_x [mm];a_y [mm];a_z [mm];b_x [mm];b_y [mm];b_z [mm]"
+    (tmp_path / "take.csv").write_text(table(header, rows(), ";", comma=True), encoding="utf-8-sig")
+    got = Recording.load(tmp_path / "take.csv")
+    assert np.allclose(got.positions, 1e-3 * X, rtol=0, atol=1e-15) and got.times.tolist() == TIMES
+    mixed = "time;a_x;a_y;a_z\n0;1,5;2.5;3\n"
+    (tmp_path / "take.csv").write_text(mixed)
+    with pytest.raises(RecordingError, match=r"line 2: holds a cell that is no number .*point"):
+        Recording.load(tmp_path / "take.csv")
+
+
+def test_units_in_some_columns_alone_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "take.csv").write_text("time,a_x [mm],a_y [mm],a_z\n0,1,2,3\n")
+    with pytest.raises(RecordingError, match="must name one length unit in all columns"):
+        Recording.load(tmp_path / "take.csv")
+
+
+def test_poses_of_ros_are_read_as_places(tmp_path: Path) -> None:
+    of = [f"field.{n}.{part}" for n in ("left", "right") for part in ("position.x", "position.y", "position.z")]
+    header = ",".join(["%time", "field.header.seq", *of[:3], "field.left.orientation.w", *of[3:]])
+    first = 1_700_000_000_000_000_000
+    lines = [header]
+    for k, frame in enumerate(X):
+        a, b = (",".join(map(str, place)) for place in frame)
+        lines.append(f"{first + 10_000_000 * k},{k},{a},1.0,{b}")
+    (tmp_path / "take.csv").write_text("\n".join(lines))
+    got = Recording.load(tmp_path / "take.csv")
+    assert got.markers == ("left", "right")
+    assert np.array_equal(got.positions, X) and np.allclose(got.times, TIMES, rtol=0, atol=1e-12)
+
+
+def test_poses_of_a_body_are_refused_with_where_they_go(tmp_path: Path) -> None:
+    (tmp_path / "take.csv").write_text("time,x,y,z,qx,qy,qz,qw\n0,1,2,3,0,0,0,1\n")
+    with pytest.raises(RecordingError, match=r"poses of a body.*--poses"):
+        Recording.load(tmp_path / "take.csv")
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".txt", ".tsv"])
+def test_frames_count_at_the_rate_of_the_json(tmp_path: Path, suffix: str) -> None:
+    header = "Frame\ta_x\ta_y\ta_z\tb_x\tb_y\tb_z\t"
+    text = table(header, [[k + 10, *frame.ravel().tolist()] for k, frame in enumerate(X)], "\t")
+    path = tmp_path / f"take{suffix}"
+    path.write_text(text.replace("\n", "\t\n").replace("\t\t\n", "\t\n"))
+    with pytest.raises(RecordingError, match=r'first column is time .*write {"rate": 100} .* into take.json'):
+        Recording.load(path)
+    path.with_suffix(".json").write_text(json.dumps({"rate": 100}))
+    got = Recording.load(path)
+    assert np.allclose(got.times, TIMES, rtol=0, atol=1e-15) and np.array_equal(got.positions, X)
+
+
+def test_an_index_before_the_time_is_not_read(tmp_path: Path) -> None:
+    text = table(",time,a_x,a_y,a_z,b_x,b_y,b_z", [[k, *row] for k, row in enumerate(rows())])
+    (tmp_path / "take.csv").write_text(text)
+    assert Recording.load(tmp_path / "take.csv").times.tolist() == TIMES
+
+
+@pytest.mark.parametrize("lost", [True, False])
+def test_zeros_are_lost_markers_where_nothing_else_is_near(tmp_path: Path, lost: bool) -> None:
+    """A marker that is at the origin for a while, and moves on from there, is seen."""
+    x = np.maximum(np.arange(40) - 8, 0)[:, None] * [0.0, 0.0, 0.01] + (1.0 if lost else 0.0)
+    if lost:
+        x[5:9] = 0.0
+    text = table("time,a_x,a_y,a_z", [[k / 100, *place.tolist()] for k, place in enumerate(x)])
+    (tmp_path / "take.csv").write_text(text)
+    seen = Recording.load(tmp_path / "take.csv").mask[:, 0]
+    assert np.flatnonzero(~seen).tolist() == ([5, 6, 7, 8] if lost else [])
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_an_array_alone(tmp_path: Path, swapped: bool) -> None:
+    path = tmp_path / "take.npy"
+    np.save(path, np.swapaxes(X, 1, 2) if swapped else X)
+    with pytest.raises(RecordingError, match=r'does not say the rate .*write {"rate": 100'):
+        Recording.load(path)
+    (tmp_path / "take.json").write_text(json.dumps({"rate": 100, "units": "mm"}))
+    got = Recording.load(path)
+    assert np.array_equal(got.positions, 1e-3 * X) and np.allclose(got.times, TIMES, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("array", "words"),
+    [
+        (np.zeros((4, 6)), r"shape \(frames, markers, 3\) \(got \(4, 6\)\)"),
+        (np.zeros((200, 10, 3)), "far more markers than frames"),
+        (np.array([[["a", "b", "c"]]]), "must have the shape"),
+    ],
+)
+def test_an_array_of_another_shape_is_refused(tmp_path: Path, array: np.ndarray, words: str) -> None:
+    np.save(tmp_path / "take.npy", array if len(array) < 100 else np.swapaxes(array, 0, 1))
+    with pytest.raises(RecordingError, match=words):
+        Recording.load(tmp_path / "take.npy")

@@ -1,0 +1,38 @@
+"""What a recording with gaps shows, and one whose times are rounded."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from sheetbend.look import Take, draft, seen
+from takes import NOISE
+
+RATE, REST = 120, 0.5
+
+
+def hanging(gaps: bool) -> sb.Recording:
+    """Ten markers of a straight line that hangs 2 m above the floor at rest, and then swings as a rigid one does."""
+    t = np.round(np.arange(361) / RATE, 4)
+    angle = 0.5 * np.sin(3.0 * np.maximum(t - REST, 0.0))
+    along = np.linspace(0.0, 0.9, 10)
+    x = along[None, :, None] * np.stack([np.sin(angle), 0 * t, -np.cos(angle)], axis=1)[:, None] + [0.0, 0.0, 2.0]
+    x += np.random.default_rng(4).normal(0.0, NOISE, x.shape)
+    if gaps:
+        for k in range(1, 10):
+            x[20 * k : 20 * k + 12, k] = np.nan
+    return sb.Recording(x, t)
+
+
+@pytest.mark.parametrize("gaps", [False, True])
+def test_gaps_are_no_motion(gaps: bool) -> None:
+    """A lost marker counted as one at the origin: it flew at 20 m/s, and rests ended at the first gap."""
+    got = seen(hanging(gaps))
+    assert 1.2 < got.speed < 1.5  # 0.9 m at 1.5 rad/s
+    assert REST - 0.01 < got.rest < REST + 0.15
+
+
+def test_the_rate_of_rounded_times() -> None:
+    """Times of four digits at 120 Hz are 0.0083 s apart in the median, which was called 120.5 Hz."""
+    found = draft([Take(seen(hanging(False)), "take.csv")], "take")
+    assert any("at 120 Hz" in sentence for sentence in found.seen)

@@ -1,0 +1,107 @@
+"""Drafts for recordings made without sheetbend: motions of ropes and cloths in closed form."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from sheetbend.config import build, parse
+from sheetbend.look import Draft, Take, draft, seen
+
+NOISE = 4e-4
+RATE = 100
+
+
+def drafted(folder: Path, x: np.ndarray, rate: float = RATE, noise: float = NOISE) -> tuple[Draft, dict]:
+    """The draft of a recording, and its content; it must build."""
+    t = np.arange(len(x)) / rate
+    x = x + np.random.default_rng(7).normal(0.0, noise, x.shape)
+    recording = sb.Recording(x, t, name="take")
+    recording.save(folder / "take.csv")
+    found = draft([Take(seen(recording), "take.csv")], "take")
+    (folder / "take.toml").write_text(found.text)
+    build(parse(folder / "take.toml"), folder)
+    return found, tomllib.loads(found.text)
+
+
+def grid(columns: int, rows: int, across: float, down: float) -> np.ndarray:
+    """(markers, 2) m of a flat cloth, row after row from the top."""
+    x, z = np.meshgrid(across * np.arange(columns), -down * np.arange(rows))
+    return np.stack([x.ravel(), z.ravel()], axis=1)
+
+
+def shaken(flat: np.ndarray, frames: int = 301) -> np.ndarray:
+    """A cloth that is carried from its upper corners and bulges in waves that run down."""
+    t = np.maximum(np.arange(frames) / RATE - 0.4, 0.0)[:, None]
+    across, down = flat[:, 0], flat[:, 1]
+    wave = (0.05 - 0.15 * down) * np.sin(5.0 * t + 4.0 * down + 1.5 * across) * np.minimum(t, 1.0)
+    sag = 0.12 * across * (across - across.max()) / across.max()
+    return np.stack([across + 0.05 * np.sin(3.0 * t), wave, 1.2 + down + sag + 0.0 * t], axis=2)
+
+
+def test_a_cloth_whose_rows_are_far_apart_is_no_rope(tmp_path: Path) -> None:
+    """Markers twice as far apart across as down a cloth were taken for a rope of 3 m through all of them."""
+    found, _ = drafted(tmp_path, shaken(grid(5, 8, 0.15, 0.0714)))
+    assert found.kind == "a cloth"
+
+
+def test_a_corner_of_a_cloth_that_is_lost_for_a_moment(tmp_path: Path) -> None:
+    """The draft did not run: it named the gap of the corner's marker, and `max_gap`."""
+    x = shaken(grid(5, 8, 0.15, 0.0714))
+    x[200:206, 0] = np.nan
+    _, content = drafted(tmp_path, x)
+    assert 0.06 < content["recording"][0]["max_gap"] < 0.1
+
+
+def kicked(rest: float = 0.4) -> np.ndarray:
+    """A line between two posts that hangs, is pushed at once, and swings about the line of the posts; 13 markers."""
+    t = np.maximum(np.arange(501) / RATE - rest, 0.0)[:, None]
+    s = np.linspace(-1.0, 1.0, 13)
+    sag = 0.35 * (1.0 - s**2)
+    angle = 0.4 * np.sin(5.5 * t) * np.exp(-0.2 * t)
+    return np.stack([0.4 * s + 0.0 * t, sag * np.sin(angle), 1.2 - sag * np.cos(angle)], axis=2)
+
+
+def test_a_push_that_no_marker_shows_is_left_out(tmp_path: Path) -> None:
+    """A chain on two posts that somebody pushes was fitted from its rest on, where nothing moves it: the fit missed all
+    of the motion."""
+    found, content = drafted(tmp_path, kicked())
+    (recording,) = content["recording"]
+    assert 0.35 < recording["fit"][0] < 0.6 and "start" not in recording
+    assert content["scene"]["rod"][0]["velocity"] == "recording"
+    assert any("something that no marker shows pushes it" in sentence for sentence in found.seen)
+
+
+def plucked() -> np.ndarray:
+    """A ruler on the edge of a desk, bent by a finger and let go after 0.25 s; two markers in the clamp."""
+    t = np.maximum(np.arange(541) / 240 - 0.25, 0.0)[:, None]
+    along = np.array([0.0, 0.02, 0.1, 0.16, 0.22, 0.3])
+    u = np.maximum(along - 0.02, 0.0) / 0.28
+    bent = 0.5 * u**2 * (3.0 - u)
+    low = -0.03 * bent * np.cos(2.0 * np.pi * 4.4 * t) * np.exp(-0.8 * t)
+    return np.stack([along + 0.0 * t, 0.0 * low, 0.75 + low], axis=2)
+
+
+def test_two_markers_that_stay_are_a_clamp(tmp_path: Path) -> None:
+    """The end was pinned at the first of them: a ruler that hangs down."""
+    _, content = drafted(tmp_path, plucked(), 240, 1e-4)
+    (rope,) = content["scene"]["rope"]
+    assert rope["clamp_start"] == [1.0, 0.0, 0.0] and "pinned" not in rope
+    assert rope["length"] == pytest.approx(0.28, rel=0.01) and "m0" not in rope["markers"]
+    assert 0.25 < content["recording"][0]["fit"][0] < 0.35
+
+
+def test_the_end_that_moves_first_is_held(tmp_path: Path) -> None:
+    """A level rope that is pulled aside at one end: the other one, which moves less, was taken for the hand."""
+    t = np.maximum(np.arange(301) / RATE - 0.5, 0.0)[:, None]
+    s = np.linspace(0.0, 1.0, 11)
+    late = np.maximum(t - 0.4 * (1.0 - s), 0.0)  # a wave that runs from the last marker to the first
+    x = np.stack([s + 0.0 * t, (0.1 + 0.2 * s) * np.sin(3.0 * late) ** 2, 1.0 - 0.2 * s * (1.0 - s) + 0.0 * t], axis=2)
+    found, content = drafted(tmp_path, x)
+    kind = "rod" if "rod" in content["scene"] else "rope"
+    (grip,) = content["scene"][kind][0]["grip"]
+    assert grip["at"] == "end" and grip["markers"] == ["m10"]
+    assert any("m10 is the end that moves first" in sentence for sentence in found.seen)
