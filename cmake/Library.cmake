@@ -16,6 +16,7 @@ configure_file(${library_dir}/sheetbend/version.h.in ${generated_dir}/sheetbend/
 file(GLOB library_sources CONFIGURE_DEPENDS ${library_dir}/*.cpp)
 add_library(sheetbend STATIC ${library_sources})
 add_library(sheetbend::sheetbend ALIAS sheetbend)
+sheetbend_compile_together(sheetbend 6)
 target_compile_definitions(sheetbend PRIVATE SHEETBEND_BUILDING)
 target_compile_features(sheetbend PUBLIC cxx_std_20)
 target_include_directories(sheetbend PUBLIC "$<BUILD_INTERFACE:${library_dir};${generated_dir}>"
