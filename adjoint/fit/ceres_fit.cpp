@@ -110,9 +110,9 @@ class Quiet {
 #endif
 };
 
-class Watch : public ceres::IterationCallback {
+class Callback : public ceres::IterationCallback {
  public:
-  Watch(const Observe& observe, const Point& point, const std::vector<double>& u)
+  Callback(const Observe& observe, const Point& point, const std::vector<double>& u)
       : observe_(observe), point_(point), u_(u) {}
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& s) override {
     if (point_.status == EvaluationStatus::interrupted) return ceres::SOLVER_ABORT;
@@ -132,7 +132,7 @@ CeresResult minimize_with_ceres(const EvaluationFunction& evaluation, std::vecto
                                 const std::vector<double>& lower, const std::vector<double>& upper,
                                 const CeresOptions& options, const Observe& observe) {
   Point point(evaluation, u, options.longest_step);
-  Watch watch(observe, point, u);
+  Callback callback(observe, point, u);
   ceres::Problem::Options problem_options;
   problem_options.evaluation_callback = &point;
   ceres::Problem problem(problem_options);
@@ -160,7 +160,7 @@ CeresResult minimize_with_ceres(const EvaluationFunction& evaluation, std::vecto
   o.line_search_interpolation_type = ceres::QUADRATIC;
   o.logging_type = ceres::SILENT;
   o.update_state_every_iteration = true;
-  o.callbacks.push_back(&watch);
+  o.callbacks.push_back(&callback);
   ceres::Solver::Summary summary;
   [[maybe_unused]] const Quiet quiet;
   ceres::Solve(o, &problem, &summary);

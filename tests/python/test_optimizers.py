@@ -61,6 +61,54 @@ def test_ceres_tells_of_failures_in_its_result_alone(capfd):
     assert capfd.readouterr() == ("", "")
 
 
+def limited(**damping: float) -> FitProblem:
+    experiments = [swinging()]
+    return FitProblem(experiments, as_parameters(WANTED | {"rope_bend_damping": damping}, experiments))
+
+
+@needs_ceres
+@pytest.mark.parametrize("initial", [0.03, 0.06, 0.1])
+def test_ceres_ends_at_the_minimum_beside_a_limit(initial):
+    """The damping, 0.02, comes to its limit on the way. Ceres went on from there by small steps along the limit, and
+    ended where a step still promised a good part of the cost."""
+    problem = limited(initial=initial, lower=0.025)
+    end, _ = minimize(problem, problem.parameters.initial(), "ceres")
+    assert end.converged and optimizers.promised(problem, end.u) < 1e-8
+    assert end.u[1] == approx(np.log(0.025), rel=1e-15)
+    assert end.evaluations < 60  # 166
+    other, _ = minimize(problem, problem.parameters.initial(), "scipy", tolerance=1e-14)
+    assert end.cost == approx(other.cost, rel=1e-6)
+
+
+@needs_ceres
+@pytest.mark.parametrize("most", [3, 8])
+def test_runs_that_hold_a_limit_share_the_most_iterations(most):
+    problem = limited(initial=0.06, lower=0.025)
+    told: list[Progress] = []
+    end, _ = minimize(problem, problem.parameters.initial(), "ceres", max_iterations=most, observe=told.append)
+    assert end.iterations <= most and max(one.iteration for one in told) == end.iterations
+
+
+@needs_ceres
+def test_ceres_leaves_a_limit_that_nothing_presses_on(monkeypatch):
+    """A run that was stopped there goes on without holding it, and without stopping again; one that held it, too."""
+    problem = limited(initial=0.06, lower=0.025)
+    resting = [frozenset(), frozenset(), frozenset({1}), frozenset()]
+    runs = []
+    run = optimizers._ceres_holding
+
+    def counted(problem, w, held, most, tolerance, best, watch, first):
+        runs.append((held, watch))
+        return run(problem, w, held, most, tolerance, best, watch, first)
+
+    monkeypatch.setattr(optimizers, "_ceres_holding", counted)
+    monkeypatch.setattr(optimizers, "_resting", lambda problem, w: resting.pop(0))
+    minimize(problem, problem.parameters.initial(), "ceres")
+    assert runs == [(frozenset(), True), (frozenset(), False)]
+    minimize(problem, problem.parameters.initial(), "ceres")
+    assert runs[2:] == [({1}, True), (frozenset(), False)]
+
+
 @needs_ceres
 @pytest.mark.parametrize("loss", ["squares", "soft_l1", "huber"])
 def test_ceres_and_scipy_give_the_same_answer(loss):

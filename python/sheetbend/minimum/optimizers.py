@@ -202,22 +202,28 @@ class _Best:
 
 
 def _ceres(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: float, best: _Best) -> Minimum:
-    """Ceres, with coordinates that rest at a limit held there: it searches along every step that it projects."""
+    """Ceres, with coordinates that rest at a limit held there, from the start or from where they come to it: it
+    searches along every step that it projects, and comes near a minimum beside a limit by small steps only."""
     w = np.clip(problem.coordinates.into(u), *problem.coordinates.limits())
     held = _resting(problem, w)
-    end = _ceres_holding(problem, w, held, max_iterations, tolerance, best)
-    if end.interrupted or not held:
-        return end
-    w = problem.coordinates.into(end.u)
-    if _resting(problem, w) >= held:
-        return end
-    again = _ceres_holding(problem, w, frozenset(), max_iterations, tolerance, best)
-    return replace(
-        again,
-        iterations=end.iterations + again.iterations,
-        evaluations=end.evaluations + again.evaluations,
-        jacobians=end.jacobians + again.jacobians,
-    )
+    spent = [0, 0, 0]
+    watch = True
+    while True:
+        left = max_iterations - spent[0]
+        end, stopped = _ceres_holding(problem, w, held, left, tolerance, best, watch, spent[0])
+        spent = [a + b for a, b in zip(spent, (end.iterations, end.evaluations, end.jacobians), strict=True)]
+        end = replace(end, iterations=spent[0], evaluations=spent[1], jacobians=spent[2])
+        if end.interrupted or (stopped is None and not held):
+            return end
+        w = problem.coordinates.into(end.u) if stopped is None else stopped
+        resting = _resting(problem, w)
+        if stopped is not None:
+            watch = bool(resting - held)
+            held |= resting
+        elif resting >= held:
+            return end
+        else:
+            held, watch = frozenset(), False
 
 
 def _resting(problem: FitProblem, w: np.ndarray) -> frozenset[int]:
@@ -234,17 +240,34 @@ def _resting(problem: FitProblem, w: np.ndarray) -> frozenset[int]:
 
 
 def _ceres_holding(
-    problem: FitProblem, w: np.ndarray, held: frozenset[int], max_iterations: int, tolerance: float, best: _Best
-) -> Minimum:
+    problem: FitProblem,
+    w: np.ndarray,
+    held: frozenset[int],
+    max_iterations: int,
+    tolerance: float,
+    best: _Best,
+    watch: bool,
+    first: int = 0,
+) -> tuple[Minimum, np.ndarray | None]:
+    """One run, whose iterations count on from `first`; if it is to watch, it ends where coordinates that are not held
+    have been at a limit for two iterations, and also returns that point."""
     from .. import _ceres as ceres
 
     coordinates = problem.coordinates
     lower, upper = coordinates.limits()
     interrupted = False
+    before, stopped = np.zeros(len(w), dtype=bool), None
 
     def observe(iteration: int, cost: float, step: float, gradient: float, at: list[float]) -> bool:
-        best(iteration, cost, coordinates.out(np.array(at)))
-        return True
+        nonlocal before, stopped
+        here = np.array(at)
+        best(first + iteration, cost, coordinates.out(here))
+        limited = (here <= lower) | (here >= upper)
+        limited[list(held)] = False
+        if watch and iteration > 1 and (limited & before).any():
+            stopped = here
+        before = limited
+        return stopped is None
 
     out: dict[str, Any] = {}
     try:
@@ -262,8 +285,8 @@ def _ceres_holding(
     except KeyboardInterrupt:
         interrupted = True
     count(out.get("evaluations", 0), out.get("jacobians", 0))  # which do not come through the problem
-    if interrupted or out["stopped"]:
-        return Minimum(
+    if interrupted or (out["stopped"] and stopped is None):
+        left = Minimum(
             best.u,
             best.cost,
             out.get("iterations", 0),
@@ -273,13 +296,14 @@ def _ceres_holding(
             "interrupted: the best point so far",
             jacobians=out.get("jacobians", 0),
         )
+        return left, None
     if not 0.0 <= out["cost"] < np.inf:  # Ceres tells a cost of -1 where its first point has no derivatives
         counts = out["iterations"], out["evaluations"]
-        return Minimum(best.u, best.cost, *counts, False, False, out["message"], jacobians=out["jacobians"])
+        return Minimum(best.u, best.cost, *counts, False, False, out["message"], jacobians=out["jacobians"]), None
     end = coordinates.out(np.array(out["u"]))
     if "jacobian" in out and not coordinates.charts:
         problem.keep(end, out["residual"], out["jacobian"])
-    return Minimum(
+    found = Minimum(
         end,
         out["cost"],
         out["iterations"],
@@ -289,6 +313,7 @@ def _ceres_holding(
         out["message"],
         jacobians=out["jacobians"],
     )
+    return found, stopped
 
 
 def _scipy(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: float, best: _Best) -> Minimum:
