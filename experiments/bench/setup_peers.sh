@@ -1,17 +1,17 @@
 #!/usr/bin/env bash
 # Makes the virtual environments of the peers, one each, under a folder: setup_peers.sh FOLDER [NAME ...]
-# Names: numba jax warp torch taichi (the first three when none is given). An environment that is there is left alone.
+# Names: numba jax warp torch taichi newton (the first three when none is given). An environment that is there is left alone.
 set -euo pipefail
-folder=${1:?usage: setup_peers.sh FOLDER [numba|jax|warp|torch|taichi ...]}
+folder=${1:?usage: setup_peers.sh FOLDER [numba|jax|warp|torch|taichi|newton ...]}
 shift
 (($#)) || set -- numba jax warp
 for name in "$@"; do
   case $name in
-    numba | torch | taichi) packages=("$name") ;;
+    numba | torch | taichi | newton) packages=("$name") ;;
     jax) packages=("jax[cpu]") ;;
     warp) packages=(warp-lang) ;;
     *)
-      echo "error: no peer is called $name; name some of: numba jax warp torch taichi" >&2
+      echo "error: no peer is called $name; name some of: numba jax warp torch taichi newton" >&2
       exit 2
       ;;
   esac
