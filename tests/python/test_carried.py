@@ -119,11 +119,13 @@ def test_nothing_is_carried_where_nothing_moves() -> None:
     assert predicted(experiment(scene, x, [8, 13])) == {}
 
 
-def test_a_rope_held_by_one_grip_with_direction() -> None:
-    """The grip of a rod drives a node, a ghost and a director: place, direction and roll carry the shape."""
+@pytest.mark.parametrize("inside", [{}, {"yield_curvature": 3.0, "yield_share": 0.4}], ids=["elastic", "yields"])
+def test_a_rope_held_by_one_grip_with_direction(inside: dict[str, float]) -> None:
+    """The grip of a rod drives a node, a ghost and a director: place, direction and roll carry the shape. What has slid
+    in its joints is held by pinned nodes, which are no grips."""
     turn, shift = poses((0.0, 0.6, 0.8))
     grip = sb.Grip(T, shift, turn[:, :, 0], turn[:, :, 2])
-    scene = sb.rod(0.4, 8, density=0.05, EI=1e-3, GJ=1e-3, start=grip)
+    scene = sb.rod(0.4, 8, density=0.05, EI=1e-3, GJ=1e-3, start=grip, **inside)
     nodes = scene.ropes["rod"].particles
     x = np.zeros((len(T), scene.particle_count, 3))
     x[:, nodes] = placed(scene.positions[nodes] - scene.positions[nodes[0]], turn, shift)

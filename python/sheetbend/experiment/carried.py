@@ -67,10 +67,13 @@ def carried_baselines(
 
 
 def _grips(scene: Scene) -> list[list[int]]:
-    """Held particles in sets that constraints connect, each with more than directors; empty where none is driven."""
+    """Held particles in sets that constraints connect, each with more than directors; empty where none is driven. A
+    pinned hidden node is no place but a number, such as what has slid in a joint, unless a body is made of it."""
     if not scene.boundary.driven:
         return []
-    owner = {p: p for p in (*scene.boundary.driven, *sorted(scene.pinned, key=scene.places_of))}
+    bodies = set(scene.body_nodes.ravel().tolist())
+    pinned = sorted((p for p in scene.pinned if p >= 0 or p in bodies), key=scene.places_of)
+    owner = {p: p for p in (*scene.boundary.driven, *pinned)}
 
     def root(p: int) -> int:
         while owner[p] != p:
