@@ -146,3 +146,22 @@ def test_a_plug_at_the_end_of_a_cable(tmp_path: Path, mass: float) -> None:
         assert plug["particle"] == "rope:end" and plug["mass"] == pytest.approx(mass / 0.05, rel=0.1)
         assert "end_mass" in content["parameters"]
         assert any("its free end carries a mass" in sentence for sentence in found.seen)
+
+
+def test_strays_are_left_out_of_a_draft(tmp_path: Path) -> None:
+    """A reflection that is seen for 8 of 300 frames became the end of a rope, whose length was not a number."""
+    x = swinging(0.0)
+    stray = np.full((len(x), 1, 3), np.nan)
+    stray[100:108] = [0.5, 0.1, 0.9]
+    found, content = drafted(tmp_path, np.concatenate([x, stray], axis=1))
+    (rope,) = content["scene"].get("rope", content["scene"].get("rod"))
+    assert "m11" not in rope["markers"] and np.isfinite(rope["length"])
+    assert any("m11 is seen in less than a tenth of the frames" in sentence for sentence in found.seen)
+
+
+def test_markers_that_are_never_seen_together_are_refused(tmp_path: Path) -> None:
+    x = swinging(0.0)[::6]
+    pieces = np.full((len(x), 2, 3), np.nan)
+    pieces[:20, 0], pieces[30:, 1] = x[:20, 4], x[30:, 4]
+    with pytest.raises(sb.RecordingError, match=r"never seen together.*give both pieces one name"):
+        drafted(tmp_path, np.concatenate([np.delete(x, 4, axis=1), pieces], axis=1))
