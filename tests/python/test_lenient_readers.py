@@ -133,3 +133,60 @@ def test_an_array_of_another_shape_is_refused(tmp_path: Path, array: np.ndarray,
     np.save(tmp_path / "take.npy", array if len(array) < 100 else np.swapaxes(array, 0, 1))
     with pytest.raises(RecordingError, match=words):
         Recording.load(tmp_path / "take.npy")
+
+
+def take_of_motive(path: Path, times: np.ndarray, markers: dict[str, np.ndarray]) -> None:
+    """A take of Motive 3 in m, of markers (frames, 3)."""
+    head = "Format Version,1.24,Take Name,take,Rotation Type,Quaternion,Length Units,Meters,Coordinate Space,Global"
+    columns = [(name, axis) for name in markers for axis in "XYZ"]
+    above = [
+        [",Type", *("Marker" for _ in columns)],
+        [",Name", *(name for name, _ in columns)],
+        [",ID", *("1" for _ in columns)],
+        [",Parent", *("" for _ in columns)],
+        [",", *("Position" for _ in columns)],
+        ["Frame,Time (Seconds)", *(axis for _, axis in columns)],
+    ]
+    table = np.concatenate(list(markers.values()), axis=1)
+    cells = [
+        [str(k), f"{t:.6f}", *("" if np.isnan(v) else repr(v) for v in row)]
+        for k, (t, row) in enumerate(zip(times, table.tolist(), strict=True))
+    ]
+    path.write_text("\n".join([head, "", *(",".join(row) for row in above + cells)]) + "\n")
+
+
+def test_unlabeled_markers_that_come_back_under_another_number_are_joined(tmp_path: Path) -> None:
+    """Each piece was a marker of its own: a rope of ten markers had sixteen, and no length."""
+    t = np.arange(240) / 120
+    whole = np.stack([[0.1 * k + 0.0 * t, 1.0 - 0.05 * k + 0.0 * t, 0.2 * np.sin(4.0 * t + k)] for k in range(3)])
+    whole = np.moveaxis(whole, 1, 2)
+    pieces = {f"Unlabeled {1000 + k}": whole[k].copy() for k in range(3)}
+    pieces["Unlabeled 1001"][100:] = np.nan
+    for name, start, stop in (("Unlabeled 1010", 112, 180), ("Unlabeled 1011", 186, 240)):
+        pieces[name] = np.full_like(whole[1], np.nan)
+        pieces[name][start:stop] = whole[1, start:stop]
+    pieces["Hand:Marker1"], pieces["Hand:Marker2"] = (np.full_like(whole[0], np.nan) for _ in range(2))
+    pieces["Hand:Marker1"][:100] = whole[0, :100] + [0.0, 0.3, 0.0]
+    pieces["Hand:Marker2"][112:] = whole[0, 112:] + [0.0, 0.3, 0.0]  # has a label, and is another one
+    take_of_motive(tmp_path / "take.csv", t, pieces)
+    got = Recording.load(tmp_path / "take.csv")
+    assert got.markers == ("Unlabeled 1000", "Unlabeled 1001", "Unlabeled 1002", "Hand:Marker1", "Hand:Marker2")
+    assert got.metadata["joined"] == {"Unlabeled 1001": ["Unlabeled 1010", "Unlabeled 1011"]}
+    lost = np.flatnonzero(~got.mask[:, 1])
+    assert lost.tolist() == [*range(100, 112), *range(180, 186)]
+    assert np.array_equal(got.positions[:100, 1], whole[1, :100]) and np.array_equal(
+        got.positions[200, 1], whole[1, 200]
+    )
+
+
+def test_a_marker_that_comes_back_elsewhere_is_another_one(tmp_path: Path) -> None:
+    t = np.arange(60) / 120
+    far = {
+        "Unlabeled 1": np.full((60, 3), 0.5),
+        "Unlabeled 2": np.full((60, 3), 0.9),
+        "Unlabeled 3": np.full((60, 3), 1.0),
+    }
+    far["Unlabeled 1"][30:], far["Unlabeled 2"][:40] = np.nan, np.nan
+    take_of_motive(tmp_path / "take.csv", t, far)
+    got = Recording.load(tmp_path / "take.csv")
+    assert len(got.markers) == 3 and "joined" not in got.metadata

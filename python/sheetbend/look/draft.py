@@ -99,6 +99,13 @@ def _told(takes: Sequence[Take], up: int | None) -> list[str]:
             + (f", noise {1e3 * take.seen.noise:.2g} mm in each coordinate" if take.seen.noise else "")
         )
     first = takes[0].seen
+    pieces = first.recording.metadata.get("joined", {})
+    if isinstance(pieces, dict) and pieces:
+        each = ", ".join(f"{name} goes on as {joined(more)}" for name, more in pieces.items())
+        said.append(f"markers without a label that were lost and found again are joined: {each}")
+    if first.rare:
+        verb = "is" if len(first.rare) == 1 else "are"
+        said.append(f"{joined(first.rare)} {verb} seen in less than a tenth of the frames, and left out")
     x = first.recording.positions
     box = np.nanmax(x, axis=(0, 1)) - np.nanmin(x, axis=(0, 1))
     said.append(f"the markers fill a box of {' x '.join(f'{v:.3g}' for v in box)} m")

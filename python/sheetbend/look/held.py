@@ -63,7 +63,9 @@ def parts(s: Seen) -> tuple[tuple[int, ...], tuple[int, ...]]:
         return hand, order
     # the rope's own first marker keeps its place in the hand too
     near = NEAR * float(np.median([s.apart[a, b] for a, b in pairwise(order)]))
-    pairs = [(at, k) for at in (0, -1) for k in hand if s.apart[order[at], k] <= near]
+    marked = {name.split(":")[0] for name in s.recording.markers if ":" in name}
+    solid = [k for k in hand if s.recording.markers[k] not in marked]  # the place of a body is no marker on a rope
+    pairs = [(at, k) for at in (0, -1) for k in solid if s.apart[order[at], k] <= near]
     if pairs:
         at, own = min(pairs, key=lambda pair: _slack(s, order[pair[0]], pair[1]))
         hand = tuple(k for k in hand if k != own)

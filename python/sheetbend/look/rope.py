@@ -11,6 +11,7 @@ import numpy as np
 
 from ..arrays.timeseries import mean_position
 from ..errors import RecordingError
+from .end_load import loaded_end
 from .held import Held, gripping, held, parts
 from .line import forks, plane, snapped, tangent
 from .seen import Seen
@@ -118,6 +119,15 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     lines += table(
         f"[scene.{kind}.markers]  # arc lengths in m", dict(zip((names[k] for k in found.order), arc, strict=True))
     )
+    load = None if s.static else loaded_end(s, found)
+    if load is not None:
+        at, mass = load[0], load[1] * density
+        notes.append(f"its free end carries a mass, some {load[1]:.2g} times that of 1 m of the rope: it is fitted")
+        unknown.append(
+            "how the mass at the free end is attached: it is a point at the last marker, which turns freely. If you "
+            "weighed it, correct `mass` in [[scene.point_mass]] and remove [parameters.end_mass]"
+        )
+        lines += table("[[scene.point_mass]]", {"name": "end", "particle": f"rope:{at}", "mass": mass}, {"mass": "kg"})
     for grip in found.grips:
         lines += table(f"[[scene.{kind}.grip]]", grip | ({"smoothing": 0.0} if estimated else {}))
     for take in takes:
@@ -133,6 +143,8 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         lines += table("[[recording]]", own, why)
     for name, limits in _parameters(s.static, density, length, flat is not None, kind == "rod").items():
         lines += table(f"[parameters.{name}]", limits)
+    if load is not None:
+        lines += table("[parameters.end_mass]", {"lower": 0.2 * mass, "upper": 5.0 * mass})
     for name, sd in found.priors.items():
         lines += table(f"[parameters.rope_{name}]", {"prior": [0.0, sd]})
     for at in found.angles:

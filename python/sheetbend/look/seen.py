@@ -9,6 +9,7 @@ import numpy as np
 
 from ..arrays.smoothing import smoothed
 from ..arrays.timeseries import default_max_gap, interpolate, mean_position
+from ..errors import RecordingError
 from ..recording.recording import Recording
 from .line import chain, tree
 
@@ -20,6 +21,7 @@ RIGID = 1.8  # times the noise, the standard deviation of the distance of two ma
 MANY, ABOVE = 50, 2.9  # frames from which on 98 % of the distances are 2.05 sqrt(2) times the noise above the true one
 SHARE, FEW = 0.98, 10  # of the frames have smaller distances; frames from which on noise is taken out of these
 REST = 0.15  # s that a recording must begin at rest to be called so
+RARE = 0.1  # of the frames in which the best one is seen: a marker seen in fewer is a reflection, or a stray
 NEAR = 1.9  # times the nearest neighbor's distance: markers of a sheet have more than two others so near
 SHARP, TURNS = 0.15, 3  # share of markers at which the shortest way through those of a sheet turns back, and how many
 SHEET, FEWEST_OF_SHEET = 2.7, 8  # others so near, on average, of a sheet; markers that make one
@@ -42,6 +44,7 @@ class Seen:
         speed: m/s, of the fastest marker, smoothed; 99 % of the frames are slower.
         up: 0, 1 or 2, the axis along which gravity points down.
         told: whether the file says it.
+        rare: names of markers that are hardly ever seen, and left out.
         sheet: whether the loose markers lie on a sheet rather than along a line.
     """
 
@@ -56,6 +59,7 @@ class Seen:
     up: int
     told: bool
     sheet: bool
+    rare: tuple[str, ...] = ()
 
     @property
     def static(self) -> bool:
@@ -71,7 +75,15 @@ class Seen:
 
 
 def seen(recording: Recording) -> Seen:
-    """Look at a recording."""
+    """Look at a recording.
+
+    Raises:
+        RecordingError: two markers are never seen together.
+    """
+    often = recording.mask.mean(axis=0)
+    rare = tuple(name for name, share in zip(recording.markers, often, strict=True) if share < RARE * often.max())
+    if rare:
+        recording = recording.select([name for name in recording.markers if name not in rare])
     x, t = recording.positions, recording.times
     count = len(recording.markers)
     found = recording.noise()
@@ -80,6 +92,7 @@ def seen(recording: Recording) -> Seen:
     extent = float(np.linalg.norm(np.nanmax(x, axis=(0, 1)) - np.nanmin(x, axis=(0, 1))))
     moved = np.sqrt(np.nanmean(np.sum((x - center) ** 2, axis=2), axis=0)) if len(t) > 1 else np.zeros(count)
     still = moved <= max(STILL * noise, SILENT * extent)
+    _check_together(recording)
     distance = _distances(x)
     apart = np.nanquantile(distance, SHARE, axis=0)
     if len(t) >= FEW:
@@ -101,7 +114,23 @@ def seen(recording: Recording) -> Seen:
         up=up,
         told=told,
         sheet=_is_sheet(x, apart, in_bodies),
+        rare=rare,
     )
+
+
+def _check_together(recording: Recording) -> None:
+    """Refuse markers of which two are never seen in one frame: mostly one that came back under another name."""
+    seen_in = recording.mask.astype(float)
+    together = seen_in.T @ seen_in
+    if together.all():
+        return
+    a, b = np.argwhere(together == 0)[0]
+    names = [recording.markers[a], recording.markers[b]]
+    fix = (
+        "if they are one marker that was lost and found again, give both pieces one name where you label the "
+        "recording; else delete one of them, or cut a part of the recording in which both are seen"
+    )
+    raise RecordingError("markers", "are never seen together, so nothing tells how far apart they are", names, fix)
 
 
 def _above(frames: int) -> float:

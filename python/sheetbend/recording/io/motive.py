@@ -3,12 +3,15 @@
 The first line names the unit; then rows of types, names and what is given stand above the columns. Measured markers are
 read, and of rigid bodies their positions, under their names: they drive grips. `read_body` gives the whole pose of
 one. Errors and qualities are left out, and so are the places where a body's solution expects its markers, and what was
-never seen. Motive's y points up.
+never seen. Unlabeled markers that are lost and come back under another number are joined (`fragments`). Motive's y
+points up.
 """
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,10 +19,12 @@ from ...arrays.timeseries import Array
 from ...errors import RecordingError
 from ...files.units import METERS
 from ..marker_data import MarkerData
+from . import fragments
 from .cells import Row, number, points_seen, refuse, split
 
 _UNITS = {"Meters": "m", "Centimeters": "cm", "Millimeters": "mm"}
 _READ = ("Marker", "Rigid Body")
+_UNNAMED = re.compile(r"unlabell?ed[ _:]*\d*", re.IGNORECASE)
 _DOWN = np.array([0.0, -9.81, 0.0])  # m/s^2
 
 
@@ -73,7 +78,11 @@ def read(path: Path, text: list[tuple[int, str]]) -> MarkerData:
         refuse(path, line, "has no columns X, Y, Z of a marker or rigid body", sorted(set(types[2:])), fix)
     times = np.array([number(path, row, cells[1]) for row, cells in frames])
     x, markers = points_seen(path, frames, names, first)
-    metadata = {"units": _UNITS[about["Length Units"]], "take": about.get("Take Name", "")}
+    metadata: dict[str, Any] = {"units": _UNITS[about["Length Units"]], "take": about.get("Take Name", "")}
+    unnamed = [_UNNAMED.fullmatch(name) is not None for name in markers]
+    if np.isfinite(times).all() and (np.diff(times) > 0).all():
+        x, markers, joined = fragments.joined(times, x, markers, unnamed)
+        metadata |= {"joined": joined} if joined else {}
     return MarkerData(x, times, markers, gravity=_DOWN, metadata=metadata)
 
 

@@ -1,0 +1,66 @@
+"""A mass at the free end of a rope in a recording, such as a plug on a cable.
+
+A flexible rope carries no force across itself, so what is beyond a point of it, rope and mass, balances across its
+direction there: rho integral(a - g) ds + m (a_end - g) has no part across the tangent. Only m/rho is unknown.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from ..arrays.smoothing import smoothed
+from .held import Held
+from .seen import REST, Seen, motion_of
+
+Array = np.ndarray
+FEWEST, FRAMES = 5, 20  # markers on the rope, and frames in which all are seen, at least
+MOVES = 0.3  # m/s^2, root mean square across the rope, at least: less is hidden by noise
+COUNTS = 0.05  # of the mass of the rope: a smaller one cannot be told from markers and stiffness
+AGREE = 0.25  # of the median: how far apart the quartiles of what the markers tell may be
+
+
+def loaded_end(s: Seen, found: Held) -> tuple[str, float] | None:
+    """The free end that carries a mass, and this mass in masses of 1 m of the rope; None where no end does."""
+    pins = found.rope.get("pinned", [])
+    ends = {at for at, k in (("start", 0), ("end", -1)) if f"clamp_{at}" in found.rope or k in pins}
+    ends |= {grip["at"] for grip in found.grips}
+    if len(ends) != 1:
+        return None
+    free = "end" if "start" in ends else "start"
+    mass = end_load(s, found.order if free == "end" else found.order[::-1])
+    return None if mass is None else (free, mass)
+
+
+def end_load(s: Seen, way: tuple[int, ...]) -> float | None:
+    """kg per kg/m of the rope, of a mass at the far end; None where there is none, or the motion does not tell.
+
+    Args:
+        way: markers in order from where the rope is held to its free end.
+    """
+    t = s.recording.times
+    if len(way) < FEWEST or len(t) < FRAMES:
+        return None
+    x, speed = motion_of(s.recording)
+    x, speed = x[:, list(way)], speed[:, list(way)]
+    _, acceleration = smoothed(t, np.nan_to_num(speed), REST / 2)
+    reach = round(REST / 2 / float(np.median(np.diff(t))))
+    lost = np.convolve(~np.isfinite(x).all(axis=(1, 2)), np.ones(2 * reach + 1), "same") > 0
+    moving = ~lost & (t > t[0] + s.rest)
+    if moving.sum() < FRAMES:
+        return None
+    x, pull = x[moving], acceleration[moving] - s.gravity
+    arc = np.concatenate([[0.0], np.cumsum([s.apart[a, b] for a, b in pairwise(way)])])
+    told = []
+    for k in range(1, 1 + len(way) // 2):  # the bending stiffness counts more near the free end
+        tangent = x[:, k + 1] - x[:, k - 1]
+        tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+        steps = np.diff(arc[k:])[:, None]
+        beyond = np.sum(0.5 * (pull[:, k:-1] + pull[:, k + 1 :]) * steps, axis=1)
+        of_rope, of_mass = (v - np.sum(v * tangent, axis=1, keepdims=True) * tangent for v in (beyond, pull[:, -1]))
+        if np.mean(np.sum(of_mass**2, axis=1)) < MOVES**2:
+            return None
+        told.append(-float(np.sum(of_rope * of_mass) / np.sum(of_mass**2)))
+    low, load, high = np.quantile(told, [0.25, 0.5, 0.75])
+    return float(load) if load > COUNTS * arc[-1] and high - low < AGREE * load else None
