@@ -4,11 +4,11 @@ Every function takes `ax`, axes to draw in, and returns the axes that it has dra
 that belongs to no window; `save` writes it, and a notebook shows `axes.figure`.
 """
 
+from .pictures.estimate_plot import plot_estimates as estimates
 from .pictures.field_plot import Field
 from .pictures.field_plot import plot_fields as fields
 from .pictures.force_plot import plot_forces as forces
 from .pictures.plotting import Motion, compared, save
-from .pictures.plotting import plot_estimates as estimates
 from .pictures.plotting import plot_motions as motions
 from .pictures.plotting import plot_residuals as residuals
 from .pictures.plotting import plot_shapes as shapes

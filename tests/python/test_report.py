@@ -248,7 +248,8 @@ def test_motions_share_a_figure() -> None:
 
 def test_shape_and_estimate_figures(result: FitResult) -> None:
     pytest.importorskip("matplotlib")
-    from sheetbend.pictures.plotting import plot_estimates, plot_shapes
+    from sheetbend.pictures.estimate_plot import plot_estimates
+    from sheetbend.pictures.plotting import plot_shapes
 
     line = np.column_stack([np.linspace(0, 1, 20), np.zeros(20), np.linspace(0, 1, 20) ** 2])
     panels = list(plot_shapes([line] * 4, [line] * 4, names=list("abcd")))
@@ -267,7 +268,7 @@ def test_shape_and_estimate_figures(result: FitResult) -> None:
 def test_numbers_of_a_wide_estimate_stand_apart(lower: float, upper: float) -> None:
     """Over one to a few decades: no two labels of the axis overlap."""
     pytest.importorskip("matplotlib")
-    from sheetbend.pictures.plotting import plot_estimates
+    from sheetbend.pictures.estimate_plot import plot_estimates
 
     wide = dataclasses.replace(estimate("cloth_warp", 50.0, 20.0, "weak", ""), lower=lower, upper=upper)
     (panel,) = plot_estimates([wide])

@@ -72,13 +72,7 @@ def indices(field: str, values: ArrayLike, count: int) -> list[int]:
 
 def index_array(field: str, values: ArrayLike, count: int) -> np.ndarray:
     """The same as one array."""
-    array = np.atleast_1d(np.array(values))
-    if array.size == 0 or not np.issubdtype(array.dtype, np.integer):
-        raise SceneError(field, "must be particle indices", values, "give whole numbers")
-    bad = array[(array < -count) | (array >= count)]
-    if bad.size:
-        raise SceneError(field, "name particles that do not exist", bad[:5].tolist(), f"use 0 to {count - 1}")
-    return array.ravel().astype(np.int64) % count
+    return node_array(field, values, count, hidden=count) % count
 
 
 def node_array(field: str, values: ArrayLike, particles: int, hidden: int = 0) -> np.ndarray:

@@ -16,6 +16,7 @@ from ..fitting.fit import Fit
 from ..motion.equilibrium import equilibrium
 from ..optional import require
 from ..pictures import plotting
+from ..pictures.estimate_plot import plot_estimates
 from ..pictures.force_plot import plot_forces
 from .cloth_figures import cloth_figures
 
@@ -59,9 +60,7 @@ def write_figures(found: Fit, config: Config, form: str, folder: Path) -> list[s
         figures |= {f"{c.experiment.name}_{one.sensor}": plot_forces(one) for one in c.forces}
         figures |= {f"{c.experiment.name}_{name}": figure for name, figure in cloth_figures(found, c).items()}
     published = _published(found, config)
-    figures["estimates"] = plotting.plot_estimates(
-        found.result.estimates, published=published, title=config.experiment.name
-    )
+    figures["estimates"] = plot_estimates(found.result.estimates, published=published, title=config.experiment.name)
     for name, figure in figures.items():
         plotting.save(figure, folder / f"{name}.{form}")
     return [f"{name}.{form}" for name in figures]

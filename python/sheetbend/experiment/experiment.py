@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -10,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.checks import is_number
 from ..errors import InputError, RecordingError
 from ..motion.solver import Solver
 from ..objects.markers import Place, places_for
@@ -19,13 +17,13 @@ from ..recording.cloud import Cloud
 from ..recording.recording import Recording
 from ..recording.windows import Window
 from ..scene.scene import Scene
+from .checks import check_driven_sigma, check_errors, check_forces, check_parts
 from .correction import Correction, recorded_noise
 from .force_sensor import INPUTS, ForceSensor
 from .names import check_names
 from .of_cloud import check_cloud, surface_of
 from .shooting import Shooting
 
-LOSSES = ("squares", "soft_l1", "huber", "cauchy")  # the last for clouds alone
 NO_SHARE = 1e-9  # interpolation weights below this are zero
 
 
@@ -95,88 +93,19 @@ class Experiment:
             raise InputError("recording", "is no Recording", self.recording, "read the file: sb.Recording.load(path)")
         if not self.name:
             object.__setattr__(self, "name", self.recording.name)
-        if not (is_number(self.sigma) and self.sigma > 0):
-            fix = "give the expected error of a marker in m"
-            raise InputError(f"{self.name}.sigma", "must be positive", self.sigma, fix)
         if self.is_cloud:
             of_markers = {"markers": self.markers, "offsets": self.offsets, "axes": self.axes.removeprefix("xyz")}
             not_yet = {"driven_sigma": self.driven_sigma, "radius": self.radius, "shooting": self.shooting}
             check_cloud(self.name, self.scene, of_markers, not_yet)
-        self._check_driven_sigma()
-        self._check_forces()
+        check_errors(self.name, self.axes, self.radius, self.loss, self.loss_scale, self.sigma, self.is_cloud)
+        check_parts(self.name, self.fit, self.held_out, self.static, self.start, self.start_time, self.predict)
         corrected, late = self.driven_sigma is not None, self.time_offset is not None
+        check_driven_sigma(self.name, self.driven_sigma, self.scene)
+        if corrected:
+            assert self.driven_noise is not None  # raises where the recording shows too little
+        check_forces(self.name, self.forces, self.scene, self.static, corrected)
         beside = {"static": self.static, "forces": bool(self.forces), "driven_sigma": corrected, "time_offset": late}
         object.__setattr__(self, "shooting", Shooting.given(self.name, self.shooting, beside))
-        if not self.axes or set(self.axes) - set("xyz") or len(set(self.axes)) != len(self.axes):
-            raise InputError(f"{self.name}.axes", "must be some of x, y, z", self.axes, "give such as 'xz'")
-        if self.radius is not None and not (math.isfinite(self.radius) and self.radius > 0):
-            fix = "give the markers' distance from their pivot in m"
-            raise InputError(f"{self.name}.radius", "must be positive", self.radius, fix)
-        if self.start not in ("given", "equilibrium"):
-            raise InputError(f"{self.name}.start", "is unknown", self.start, "use 'given' or 'equilibrium'")
-        if self.loss not in LOSSES[: len(LOSSES) if self.is_cloud else -1]:
-            known = "'squares', 'soft_l1' or 'huber', or for a cloud 'cauchy'"
-            raise InputError(f"{self.name}.loss", "is unknown", self.loss, f"use {known}")
-        if not (math.isfinite(self.loss_scale) and self.loss_scale > 0):
-            raise InputError(
-                f"{self.name}.loss_scale", "must be positive", self.loss_scale, "give it in units of sigma"
-            )
-        if self.predict not in (None, "window", "mean"):
-            raise InputError(
-                f"{self.name}.predict", "is unknown", self.predict, "use 'window' or 'mean', or leave it out"
-            )
-        if self.start_time is not None and not math.isfinite(self.start_time):
-            raise InputError(
-                f"{self.name}.start_time", "must be finite", self.start_time, "give a time of the recording in s"
-            )
-        for part, window in (("fit", self.fit), ("held_out", self.held_out)):
-            if window is not None and np.shape(window) != (2,):
-                raise InputError(
-                    f"{self.name}.{part}", "must be (start, stop)", window, "give two times of the recording in s"
-                )
-        if (
-            self.fit is not None
-            and self.held_out is not None
-            and max(self.fit[0], self.held_out[0]) < min(self.fit[1], self.held_out[1])
-        ):
-            raise InputError(
-                f"{self.name}.held_out",
-                "overlaps the fitted part",
-                self.held_out,
-                "hold out frames that the fit does not see",
-            )
-        if self.static and self.held_out is not None:
-            raise InputError(
-                f"{self.name}.held_out",
-                "makes no sense for an equilibrium",
-                self.held_out,
-                "hold out whole recordings: predict = 'mean'",
-            )
-
-    def _check_driven_sigma(self) -> None:
-        field, given = f"{self.name}.driven_sigma", self.driven_sigma
-        if given is None:
-            return
-        if given != "estimate" and not (is_number(given) and given > 0):  # type: ignore[operator]
-            fix = "give the noise of the driven markers in m, or 'estimate'"
-            raise InputError(field, "must be positive", given, fix)
-        if not self.scene.boundary.following:
-            fix = "let particles follow markers (Scene.follow, [[scene.drive]], [[scene.cloth.grip]]), or leave it out"
-            raise InputError(field, "has no driven marker to correct", given, fix)
-        assert self.driven_noise is not None
-
-    def _check_forces(self) -> None:
-        names = [sensor.name for sensor in self.forces]
-        if len(set(names)) != len(names):
-            raise InputError(f"{self.name}.forces", "share a name", names, "give each sensor a name of its own")
-        if self.forces and self.static:
-            fix = "give a motion, or fit a still load by its shape alone"
-            raise InputError(f"{self.name}.forces", "are compared along motions, not at rest", names, fix)
-        if self.forces and self.driven_sigma is not None:
-            fix = "leave out driven_sigma, or the forces"
-            raise InputError(f"{self.name}.forces", "do not go with a correction of driven markers", names, fix)
-        for i, sensor in enumerate(self.forces):
-            sensor.check(self.scene, f"{self.name}.force[{i}]")
 
     @cached_property
     def driven_noise(self) -> float | None:

@@ -12,7 +12,7 @@ from typing import Any
 from ..files.whole import write_text
 from ..quantities.wording import figures, short
 from ..report.tables import Section, plain_section
-from ..result.estimate import Estimate
+from ..result.estimate import Estimate, estimate_of
 
 FORMAT = "sheetbend plan 1"
 
@@ -57,10 +57,7 @@ class Plan:
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of that name; KeyError names the ones there are."""
-        for estimate in self.estimates:
-            if estimate.name == name:
-                return estimate
-        raise KeyError(f"no estimate of {name!r}; there are: {', '.join(e.name for e in self.estimates)}")
+        return estimate_of(self.estimates, name)
 
     def report(self) -> str:
         """As plain text, at most 100 columns wide."""

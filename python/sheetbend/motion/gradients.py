@@ -153,10 +153,14 @@ def check_gradients(
     tested on the largest gradient entries and on random ones.
 
     Args:
+        scene: is frozen by this.
         times: (frames,) s on the substep grid; a short stretch of motion is enough.
-        values: quantities to change, by name.
-        seconds: about how long the check may take. A scene that takes longer is checked on fewer entries, or along one
-            direction of all entries of an array, and over fewer substeps; the report says so.
+        solver: `Solver()` by default.
+        samples: entries of each array that are tested, at most.
+        seed: of the random loss and of the random entries.
+        values: quantities to change, by name, in their units.
+        seconds: s, about how long the check may take. A scene that takes longer is checked on fewer entries, or along
+            one direction of all entries of an array, and over fewer substeps; the report states this.
 
     Raises:
         InputError, DivergenceError: as `simulate`; times without a substep, or fewer than one sample.

@@ -56,8 +56,21 @@ def cloth(
     pinned: ArrayLike = (),
     **options: object,
 ) -> Scene:
-    """A scene with one cloth; see `add_cloth` for the options. `pinned` holds vertices, such as
-    `mesh.sets["corners"]`; they are its `held` ones where no others are given."""
+    """Make a scene with one cloth.
+
+    Args:
+        mesh: with material coordinates along warp and weft, m.
+        density: mass per area, kg/m^2.
+        warp: tension stiffness along the warp, N/m.
+        shear: shear stiffness, N/m.
+        name: of the cloth and of the scene; the prefix of its quantities.
+        gravity: (3,) m/s^2.
+        pinned: vertices that stay in place, such as `mesh.sets["corners"]`; also `held`, unless that is given.
+        options: those of `add_cloth`.
+
+    Raises:
+        SceneError: wrong or missing values; the message names the field.
+    """
     scene = Scene(name, gravity)
     still = indices("cloth.pinned", pinned, len(mesh.vertices)) if np.size(pinned) else []
     given = {"held": still, **options}
@@ -131,7 +144,7 @@ def add_cloth(
         yield_share: the part of the bending stiffness that slides, between 0 and 1: beyond yield (1 - share) of it is
             left. Small motion shows all of it. A strip bent back and forth has a loop of 2 share bending
             yield_curvature in its moment per width (2HB of a KES test).
-        drag_linear, drag_quadratic: air drag per area, isotropic.
+        drag_linear, drag_quadratic: air drag per area, N s/m^3 and N s^2/m^4, isotropic.
         warp_size, weft_size: size of the flat cloth along warp and weft over that of the mesh, between 0.8 and 1.25:
             what it would be without tension, its area and its mass follow, and the numbers of the fabric stay. The
             initial shape, places of markers on the mesh and angles at rest of `curved` are kept. Give 1.0 to fit what a

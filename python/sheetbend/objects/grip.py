@@ -59,9 +59,9 @@ class Grip:
             times: (knots,) s.
             positions: (knots, 3) m.
             quaternions: (knots, 4), (x, y, z, w), from the gripper's own axes to the world's.
-            direction: the rod's direction of travel in the gripper's axes.
-            director: the frame's first axis in the gripper's axes.
-            offset: m, where the rod enters the grip, in the gripper's axes.
+            direction: (3,), the rod's direction from start to end, in the gripper's axes.
+            director: (3,), the first axis of the rod's frame, in the gripper's axes.
+            offset: (3,) m, where the rod enters the grip, in the gripper's axes.
             frame: of the poses, where that is not the recording's: its six quantities then correct the transform.
 
         Raises:

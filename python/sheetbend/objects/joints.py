@@ -144,6 +144,7 @@ def slider(
     `<name>_limit_damping` N s/m where given.
 
     Args:
+        upper, lower: the bodies; None is the ground.
         at: (3,) m, a point of the lower body in the world that stays on the line.
         axis: (3,) the line's direction in the world.
         rate: m/s, at the start.
@@ -177,9 +178,11 @@ def cylinder(
     rad/s, the start of the lower body.
 
     Args:
-        at, axis: as of `slider`.
+        upper, lower: the bodies; None is the ground.
+        at: (3,) m, a point of the lower body in the world that stays on the line.
+        axis: (3,) the line's direction in the world.
         rate: m/s, along the line at the start.
-        turn_rate: rad/s, about it.
+        turn_rate: rad/s, about the line at the start.
 
     Raises:
         SceneError: as `ball`.
@@ -197,8 +200,9 @@ def fixed(upper: Body | None, lower: Body, *, at: ArrayLike | None = None, name:
     Quantities: its place as of `ball`. The lower body starts where the upper one carries it.
 
     Args:
+        upper, lower: the bodies; None is the ground.
         at: (3,) m, the point in the world where they are held together; the origin of the lower body's frame by
-            default. It is where a joint's force counts from.
+            default. Forces and torques of the joint refer to it.
 
     Raises:
         SceneError: as `ball`.

@@ -100,9 +100,11 @@ def on_body(body: Body, points: ArrayLike) -> tuple[Place, ...]:
 
 
 def on_rope(rope: Rope, arc_length: float, interpolation: str = "cubic") -> Place:
-    """A marker at a material coordinate [m] of a rope.
+    """A marker at a place along a rope.
 
     Args:
+        rope: as `add_rope` returned it.
+        arc_length: m, from the rope's start along the rope at rest.
         interpolation: "cubic" through the four nearest nodes (for ropes that bend smoothly), or "linear".
 
     Raises:
@@ -135,7 +137,11 @@ def _check_rope(rope: object) -> None:
 
 
 def on_cloth(cloth: Cloth, points: ArrayLike) -> tuple[Place, ...]:
-    """Markers at material coordinates of a cloth, (k, 2) m along warp and weft.
+    """Markers at places of a cloth.
+
+    Args:
+        cloth: as `add_cloth` returned it.
+        points: (k, 2) m, material coordinates along warp and weft.
 
     Raises:
         MeshError: a point lies outside of the cloth.

@@ -49,7 +49,20 @@ def rod(
     gravity: ArrayLike = (0.0, 0.0, -9.81),
     **options: object,
 ) -> Scene:
-    """A scene with one rod; see `add_rod` for the options."""
+    """Make a scene with one rod.
+
+    Args:
+        length: m, between the grips.
+        segments: number of equal links.
+        density: kg/m.
+        EI, GJ: bending and torsional stiffness N m^2.
+        name: of the rod and of the scene; the prefix of its quantities.
+        gravity: (3,) m/s^2.
+        options: those of `add_rod`.
+
+    Raises:
+        SceneError: wrong or missing values; the message names the field.
+    """
     scene = Scene(name, gravity)
     add_rod(scene, name, length=length, segments=segments, density=density, EI=EI, GJ=GJ, **options)  # type: ignore[arg-type]
     return scene
@@ -113,8 +126,7 @@ def add_rod(
         velocity: (k, 3) m/s at `points`; at rest by default.
         start, end: how the ends are held; None = free. A point of a body (`Body.point`) holds the end there, as a ball
             joint or, where it has a direction `along` (the rod's direction of travel), firmly. A `Junction` holds the
-            ends of several rods, or both of one, to
-            each other.
+            ends of several rods, or both of one, to each other.
         director: (3,) the first frame axis at a start without a grip; any by default.
         hold_roll: ends ("start", "end") without a grip at which the rod does not spin about its own axis. It turns
             there in every direction, as on a universal joint: the frame's first axis stays in the plane of the edge and
@@ -125,7 +137,7 @@ def add_rod(
             first and second axis and along the rod. The initial shape follows, less and less towards the other end.
         roll: add the roll of the end grip about the rod: the twist built in when the rod was gripped.
         stretch_damping, bend_damping, twist_damping, shear_damping: Kelvin-Voigt time constants s.
-        drag_linear, drag_quadratic: air drag per length, isotropic.
+        drag_linear, drag_quadratic: air drag per length, N s/m^2 and N s^2/m^3, isotropic.
         yield_curvature: 1/m, the elastic curvature beyond which internal friction slides (in the frame's two axes; with
             EI2 the second one counts by sqrt(EI2/EI)); None = elastic. The set starts at zero.
         yield_share: the part of the bending stiffness that slides, between 0 and 1: beyond yield (1 - share) EI is

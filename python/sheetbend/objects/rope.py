@@ -62,7 +62,22 @@ def rope(
     pinned: Sequence[int] = (0,),
     **options: object,
 ) -> Scene:
-    """A scene with one rope; see `add_rope` for the options. `pinned` holds node numbers along the rope (-1 = last)."""
+    """Make a scene with one rope.
+
+    Args:
+        length: m.
+        segments: number of equal links.
+        density: kg/m.
+        EA: axial stiffness N; None = inextensible.
+        EI: bending stiffness N m^2; None = no bending.
+        name: of the rope and of the scene; the prefix of its quantities.
+        gravity: (3,) m/s^2.
+        pinned: numbers of particles along the rope that stay in place; -1 is the last one.
+        options: those of `add_rope`.
+
+    Raises:
+        SceneError: wrong or missing values; the message names the field.
+    """
     scene = Scene(name, gravity)
     built = add_rope(scene, name, length=length, segments=segments, density=density, EA=EA, EI=EI, **options)  # type: ignore[arg-type]
     if np.size(pinned):
@@ -113,8 +128,8 @@ def add_rope(
         density: kg/m; nodes carry it by their Voronoi length.
         EA: axial stiffness N; None = inextensible.
         EI: bending stiffness N m^2; None = no bending.
-        start, direction: a straight initial shape. By default it points as `clamp_start`, or else `clamp_end`, or
-            along x.
+        start: (3,) m, where a straight initial shape begins.
+        direction: (3,), of a straight initial shape; that of `clamp_start`, or else `clamp_end`, or x by default.
         points: (k, 3) m, an initial shape instead, resampled to equal links.
         velocity: (k, 3) m/s at `points`, which are then fitted to the length; at rest by default.
         stretch_damping, bend_damping: Kelvin-Voigt time constants s: the damping moment is EI times the constant times
@@ -122,9 +137,9 @@ def add_rope(
         loss_factor: energy lost per radian of vibration over the energy stored, in stretching and bending alike, at
             loss_frequency (Hz); instead of the two time constants: tau = loss_factor / (2 pi loss_frequency). In
             rubbers it varies less with frequency than tau.
-        drag_linear, drag_quadratic: air drag per length, isotropic.
-        clamp_start, clamp_end: the rope's direction of travel at an end, held by a hidden node half a joint away;
-            the end is pinned.
+        drag_linear, drag_quadratic: air drag per length, N s/m^2 and N s^2/m^3, isotropic.
+        clamp_start, clamp_end: (3,), the rope's direction from start to end at a clamped end. The end is pinned, and a
+            hidden node half a link away holds the direction.
         grip_start, grip_end: what holds an end and moves it: its place and its direction of travel. A rope has no
             twist: the roll of a grip plays no part. The initial shape is fitted to the length between grips. A point of
             a body (`Body.point`) holds the end there, in its direction `along` if it has one.
@@ -135,7 +150,7 @@ def add_rope(
             exactly. `_start_lead` and `_end_lead` are that much more rope between them: the grip goes back along the
             rope, and markers keep their places.
         clamp_angles: add `_start_angle` / `_end_angle`, rotations of the clamps about `plane`.
-        plane: unit normal of the plane that the rope stays in; needed by clamp_angles and set_modes.
+        plane: (3,), unit normal of the plane that the rope stays in; needed by clamp_angles and set_modes.
         set_modes: k of rest-curvature modes cos(k pi s / length) about `plane`; each amplitude starts at zero.
 
     Returns:

@@ -75,8 +75,19 @@ def solid(
     pinned: ArrayLike = (),
     **options: object,
 ) -> Scene:
-    """A scene with one solid; see `add_solid` for the options. `pinned` holds vertices, such as `mesh.sets["x_min"]`;
-    they are its `held` ones where no others are given."""
+    """Make a scene with one solid.
+
+    Args:
+        mesh: the shape at rest, m.
+        density: kg/m^3.
+        name: of the solid and of the scene; the prefix of its quantities.
+        gravity: (3,) m/s^2.
+        pinned: vertices that stay in place, such as `mesh.sets["x_min"]`; also `held`, unless that is given.
+        options: those of `add_solid`.
+
+    Raises:
+        SceneError: wrong or missing values; the message names the field.
+    """
     scene = Scene(name, gravity)
     still = indices("solid.pinned", pinned, len(mesh.vertices)) if np.size(pinned) else []
     given = {"held": still, **options}
@@ -125,8 +136,9 @@ def add_solid(
             so on.
         poisson: Poisson's ratio, above -1 and below 0.5.
         orthotropic: a material that differs along three axes, instead of these two; it has no volume row.
-        clusters: shape matching instead of elements: vertices of each cluster, which may share some, such as
-            `cluster_boxes` gives. Each cluster is drawn to its own shape at rest, turned. `poisson` is left out.
+        clusters: shape matching instead of elements: (k,) vertices of each cluster, such as `cluster_boxes` gives;
+            clusters may share vertices. Springs pull each cluster to its shape at rest, rotated to fit best. `poisson`
+            is left out.
         stiffness_modes: of clusters with one E: by how many smooth modes ln E varies from cluster to cluster. The
             quantities are `<material>_stiffness_1` and so on, the smoothest first, each the root mean square of what it
             adds to ln E; 0 at the start. `smooth` of `fit` gives them a prior.

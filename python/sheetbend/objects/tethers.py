@@ -21,8 +21,9 @@ def add_tethers(
     hide the fabric's own stiffness: leave them out of fits of it.
 
     Args:
+        scene: of the cloth.
         cloth: as `add_cloth` returned it.
-        anchors: vertices; those that are pinned or driven by default.
+        anchors: (k,) numbers of vertices; those that are pinned or driven by default.
         stretch: how much longer a tether is than the way along the mesh's edges to the anchor, which is never shorter
             than that across the fabric.
         compliance: m/N, of a taut tether.

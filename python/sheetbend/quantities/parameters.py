@@ -197,7 +197,15 @@ class Parameters(Mapping[str, Parameter]):
         return self._roots
 
     def replace(self, name: str, **changes: Any) -> Parameters:
-        """The same parameters with fields of one changed, such as `replace("rope_EA", fixed=True)`."""
+        """The same parameters with fields of one changed, such as `replace("rope_EA", fixed=True)`.
+
+        Args:
+            name: of the parameter.
+            changes: fields of `Parameter` and their new values.
+
+        Raises:
+            InputError: no parameter has this name; a field with a value that `Parameter` refuses.
+        """
         if name not in self:
             raise InputError("parameters", "have no such name", name, f"name one of: {', '.join(self)}")
         return Parameters(replace(p, **changes) if p.name == name else p for p in self.values())

@@ -42,7 +42,8 @@ def start_of_poses(
 
     Args:
         times: (frames,) s.
-        positions, quaternions: as in `Recording.from_poses`.
+        positions: (frames, 3) m, of the frame's origin; NaN where it was not seen.
+        quaternions: (frames, 4), (x, y, z, w), from the body's axes to the world's.
         gravity: (3,) m/s^2 of a free flight; zero where the first poses are about straight and even.
         time: s, that of the state; the first of `times` by default.
 

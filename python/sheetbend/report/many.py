@@ -14,7 +14,7 @@ import numpy as np
 
 from ..files.whole import write_text
 from ..quantities.wording import short
-from ..result.estimate import Estimate
+from ..result.estimate import Estimate, estimate_of
 from .tables import Section, plain_section
 
 FORMAT = "sheetbend many 1"
@@ -75,10 +75,7 @@ class ManyFit:
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of a shared parameter; KeyError names the ones there are."""
-        for estimate in self.estimates:
-            if estimate.name == name:
-                return estimate
-        raise KeyError(f"no estimate of {name!r}; there are: {', '.join(e.name for e in self.estimates)}")
+        return estimate_of(self.estimates, name)
 
     def report(self) -> str:
         """The report as plain text."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from ..errors import InputError
@@ -55,6 +55,14 @@ class Estimate:
     def __post_init__(self) -> None:
         if self.verdict not in VERDICTS:
             raise InputError(f"{self.name}.verdict", "is unknown", self.verdict, f"use one of: {', '.join(VERDICTS)}")
+
+
+def estimate_of(estimates: Sequence[Estimate], name: str) -> Estimate:
+    """The estimate of that name; KeyError names the ones there are."""
+    for estimate in estimates:
+        if estimate.name == name:
+            return estimate
+    raise KeyError(f"no estimate of {name!r}; there are: {', '.join(e.name for e in estimates)}")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from .bootstrap import Bootstrap
-from .estimate import UNSOUND, Correlation, Estimate, Given, Premise, ProfileCurve
+from .estimate import UNSOUND, Correlation, Estimate, Given, Premise, ProfileCurve, estimate_of
 from .field import FieldFit
 from .motions import ContactFit, ForceFit, Kinks, MotionGrowth, RecordingFit
 from .shot import ShotMotion
@@ -153,10 +153,7 @@ class FitData:
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of that name; KeyError names the ones there are."""
-        for estimate in self.estimates:
-            if estimate.name == name:
-                return estimate
-        raise KeyError(f"no estimate of {name!r}; there are: {', '.join(e.name for e in self.estimates)}")
+        return estimate_of(self.estimates, name)
 
     @property
     def sound(self) -> bool:

@@ -168,9 +168,12 @@ class Scene(SelfTouchingScene):
             kind: a name in `sheetbend.KINDS`, which holds what follows of each kind; docs/constraints.md lists them.
             particles: (count, arity) particles; of some kinds also hidden nodes, as `add_directors` returns them.
             name: of the group; the kind by default.
-            compliance: 0 = rigid, in the kind's unit; what it is made of is in KINDS, such as "Voronoi length / EI".
-            damping: beta of the Rayleigh dissipation (Macklin et al. 2016, eq. 26): force per rate of C.
-            viscosity: the element resists the rate of C only, in the unit of damping; excludes compliance and damping.
+            compliance: one number or (count,), in the kind's unit; 0 = rigid. KINDS has the formula, such as
+                "Voronoi length / EI".
+            damping: one number or (count,), beta of the Rayleigh dissipation (Macklin et al. 2016, eq. 26): force per
+                rate of C.
+            viscosity: one number or (count,), in the unit of damping: the element resists the rate of C only. Excludes
+                compliance and damping.
             rest: (count, parameters) those of KINDS whose source is "given", "measured" or "usual", in that order; also
                 (count,) or one number where there is one, such as a rest length. Left out, a measured parameter is what
                 the initial positions make it, and a usual one has its usual value.

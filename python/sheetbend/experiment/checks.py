@@ -1,0 +1,89 @@
+"""What an experiment refuses: options that do not exist, parts that overlap, and what does not go together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..arrays.checks import is_number
+from ..errors import InputError
+from ..recording.windows import Window
+from ..scene.scene import Scene
+from .force_sensor import ForceSensor
+
+LOSSES = ("squares", "soft_l1", "huber", "cauchy")  # the last for clouds alone
+
+
+def check_errors(
+    name: str, axes: str, radius: float | None, loss: str, loss_scale: float, sigma: float, is_cloud: bool
+) -> None:
+    """Refuse what errors of markers cannot be measured by, see the fields of `Experiment`."""
+    if not (is_number(sigma) and sigma > 0):
+        raise InputError(f"{name}.sigma", "must be positive", sigma, "give the expected error of a marker in m")
+    if not axes or set(axes) - set("xyz") or len(set(axes)) != len(axes):
+        raise InputError(f"{name}.axes", "must be some of x, y, z", axes, "give such as 'xz'")
+    if radius is not None and not (math.isfinite(radius) and radius > 0):
+        raise InputError(
+            f"{name}.radius", "must be positive", radius, "give the markers' distance from their pivot in m"
+        )
+    if loss not in LOSSES[: len(LOSSES) if is_cloud else -1]:
+        known = "'squares', 'soft_l1' or 'huber', or for a cloud 'cauchy'"
+        raise InputError(f"{name}.loss", "is unknown", loss, f"use {known}")
+    if not (math.isfinite(loss_scale) and loss_scale > 0):
+        raise InputError(f"{name}.loss_scale", "must be positive", loss_scale, "give it in units of sigma")
+
+
+def check_parts(
+    name: str,
+    fit: Window | None,
+    held_out: Window | None,
+    static: bool,
+    start: str,
+    start_time: float | None,
+    predict: str | None,
+) -> None:
+    """Refuse parts of a recording that cannot be fitted or predicted, see the fields of `Experiment`."""
+    if start not in ("given", "equilibrium"):
+        raise InputError(f"{name}.start", "is unknown", start, "use 'given' or 'equilibrium'")
+    if predict not in (None, "window", "mean"):
+        raise InputError(f"{name}.predict", "is unknown", predict, "use 'window' or 'mean', or leave it out")
+    if start_time is not None and not math.isfinite(start_time):
+        raise InputError(f"{name}.start_time", "must be finite", start_time, "give a time of the recording in s")
+    for part, window in (("fit", fit), ("held_out", held_out)):
+        if window is not None and np.shape(window) != (2,):
+            raise InputError(f"{name}.{part}", "must be (start, stop)", window, "give two times of the recording in s")
+    if fit is not None and held_out is not None and max(fit[0], held_out[0]) < min(fit[1], held_out[1]):
+        fix = "hold out frames that the fit does not see"
+        raise InputError(f"{name}.held_out", "overlaps the fitted part", held_out, fix)
+    if static and held_out is not None:
+        fix = "hold out whole recordings: predict = 'mean'"
+        raise InputError(f"{name}.held_out", "makes no sense for an equilibrium", held_out, fix)
+
+
+def check_driven_sigma(name: str, given: float | str | None, scene: Scene) -> None:
+    """Refuse a noise of driven markers that is no noise, or has no markers."""
+    if given is None:
+        return
+    if given != "estimate" and not (is_number(given) and given > 0):  # type: ignore[operator]
+        fix = "give the noise of the driven markers in m, or 'estimate'"
+        raise InputError(f"{name}.driven_sigma", "must be positive", given, fix)
+    if not scene.boundary.following:
+        fix = "let particles follow markers (Scene.follow, [[scene.drive]], [[scene.cloth.grip]]), or leave it out"
+        raise InputError(f"{name}.driven_sigma", "has no driven marker to correct", given, fix)
+
+
+def check_forces(name: str, sensors: Sequence[ForceSensor], scene: Scene, static: bool, corrected: bool) -> None:
+    """Refuse force sensors that share a name, or that a scene or an experiment cannot have."""
+    names = [sensor.name for sensor in sensors]
+    if len(set(names)) != len(names):
+        raise InputError(f"{name}.forces", "share a name", names, "give each sensor a name of its own")
+    if sensors and static:
+        fix = "give a motion, or fit a still load by its shape alone"
+        raise InputError(f"{name}.forces", "are compared along motions, not at rest", names, fix)
+    if sensors and corrected:
+        fix = "leave out driven_sigma, or the forces"
+        raise InputError(f"{name}.forces", "do not go with a correction of driven markers", names, fix)
+    for i, sensor in enumerate(sensors):
+        sensor.check(scene, f"{name}.force[{i}]")
