@@ -34,15 +34,17 @@ def gauss_newton(task: Task, seconds: float, start: Array | None = None, most: i
         if len(search.outcomes) + search.lost > most or search.seconds[-1] > seconds:
             break
         step = np.linalg.solve(jacobian.T @ jacobian + damping * np.eye(task.size), -jacobian.T @ rest)
+        foreseen = outcome.cost - float(np.sum((rest + jacobian @ step) ** 2))
         try:
-            tried, *derived = task.outcome_and_residuals(unknowns + step)
+            tried = task.outcome(unknowns + step)
+            share = (outcome.cost - tried.cost) / foreseen
+            if share >= ENOUGH:  # nobody asks for the Jacobian elsewhere
+                tried, *derived = task.outcome_and_residuals(unknowns + step)
         except FAILURES:
             search.lost += 1
             damping *= 4.0
             continue
         search.note(unknowns + step, tried)
-        foreseen = outcome.cost - float(np.sum((rest + jacobian @ step) ** 2))
-        share = (outcome.cost - tried.cost) / foreseen
         if share < ENOUGH:
             damping *= 3.0
             continue

@@ -82,7 +82,7 @@ def test_code_in_the_texts_runs(block: str, tmp_path: Path, monkeypatch: pytest.
     monkeypatch.chdir(tmp_path)
     (tmp_path / "experiments").symlink_to(ROOT / "experiments")
     if "rope_2/" in block:  # stands for a reader's own data set
-        small = ["--ropes", "2", "--train", "3", "--eval", "1", "--seconds", "1"]
+        small = ["--ropes", "2", "--train", "2", "--eval", "1", "--seconds", "0.5"]
         subprocess.run([sys.executable, "experiments/gripped_ropes/make_data.py", ".", *small], check=True)
     exec(compile(block, "README", "exec"), {"__name__": "readme"})
 

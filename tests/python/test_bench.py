@@ -262,9 +262,10 @@ class TestChainAndLadder:
 
     @pytest.mark.slow
     def test_cloth(self) -> None:
-        found = {**measure_cloth(repeats=1, cells=(4, 6)), "exit_code": 0}
+        found = {**measure_cloth(repeats=1, cells=(4, 6), vertex_substeps=1_000), "exit_code": 0}
         expect_figures(found)
         assert [row["particles"] for row in found["rows"]] == [25, 49]
+        assert [row["substeps"] for row in found["rows"]] == [40, 20]
         assert all(row["gradient_step_ms"] > row["forward_step_ms"] > 0 for row in found["rows"])
         assert found["swatch"]["batch"]["sheets"] == 8 and found["swatch"]["newton"]["iterations"] == 2
 

@@ -49,13 +49,15 @@ def measure_cloth(
     threads: int = 1,
     repeats: int = 5,
     cells: tuple[int, ...] = CELLS,
+    vertex_substeps: int = VERTEX_SUBSTEPS,
     progress: Callable[[dict[str, Any]], None] = lambda row: None,
 ) -> dict[str, Any]:
     """One row per size, swatches with the default bending, by Newton and in lanes; `progress` gets each row."""
     rows: list[dict[str, Any]] = []
     for n in cells:
-        rows.append(in_fresh_process(_climb, n, threads, repeats))
+        rows.append(in_fresh_process(_climb, n, substeps_of(n, vertex_substeps), threads, repeats))
         progress(rows[-1])
+    substeps = substeps_of(cells[0], vertex_substeps)
     return {
         "workload": "cloth",
         **rows[0],
@@ -65,9 +67,9 @@ def measure_cloth(
         "repeats": repeats,
         "rows": rows,
         "swatch": {
-            "curvature": _row(cells[0], substeps_of(cells[0]), _solver(threads), repeats, "curvature"),
+            "curvature": _row(cells[0], substeps, _solver(threads), repeats, "curvature"),
             "newton": _row(cells[0], 5, Solver(h=H, method="newton", threads=threads), repeats, "curvature"),
-            "batch": _batch(cells[0], substeps_of(cells[0]), threads, repeats),
+            "batch": _batch(cells[0], substeps, threads, repeats),
         },
         "gradient_error": gradient_error(),
         "gradient_error_bound": BOUND,
@@ -101,18 +103,17 @@ def sheet(cells: int, bending_model: str = "dihedral", warp: float = 200.0) -> S
     return scene
 
 
-def substeps_of(cells: int) -> int:
+def substeps_of(cells: int, vertex_substeps: int) -> int:
     """As many as are measured: fewer of larger sheets."""
-    return max(MIN_SUBSTEPS, VERTEX_SUBSTEPS // (cells + 1) ** 2)
+    return max(MIN_SUBSTEPS, vertex_substeps // (cells + 1) ** 2)
 
 
 def _solver(threads: int) -> Solver:
     return replace(SOLVER, threads=threads)
 
 
-def _climb(cells: int, threads: int, repeats: int) -> dict[str, Any]:
+def _climb(cells: int, substeps: int, threads: int, repeats: int) -> dict[str, Any]:
     """One row; for a process of its own."""
-    substeps = substeps_of(cells)
     peak = peak_mb(sheets(cells, substeps, _solver(threads))[0].gradient)
     return {**_row(cells, substeps, _solver(threads), repeats, "dihedral"), "peak_mb": peak}
 
