@@ -165,3 +165,54 @@ def test_markers_that_are_never_seen_together_are_refused(tmp_path: Path) -> Non
     pieces[:20, 0], pieces[30:, 1] = x[:20, 4], x[30:, 4]
     with pytest.raises(sb.RecordingError, match=r"never seen together.*give both pieces one name"):
         drafted(tmp_path, np.concatenate([np.delete(x, 4, axis=1), pieces], axis=1))
+
+
+def test_a_flag_is_held_at_its_pole(tmp_path: Path) -> None:
+    """The upper row was taken for what holds it, and its free corner for a hand, though a side stays in place."""
+    flat = grid(7, 5, 0.1, 0.1)
+    t = np.arange(301)[:, None] / RATE
+    across = flat[:, 0]
+    wave = 0.12 * across * np.sin(9.0 * t - 8.0 * across + flat[:, 1])
+    x = np.stack(
+        [0.97 * across + 0.0 * t, wave, 2.0 + flat[:, 1] - 0.15 * across + 0.01 * np.sin(7.0 * t) * across], axis=2
+    )
+    found, content = drafted(tmp_path, x)
+    (cloth,) = content["scene"]["cloth"]
+    assert cloth["pinned"] == ["left"] and "grip" not in cloth
+    assert content["scene"]["wind"]["velocity"][0] > 1.0
+    assert any("the left row of markers" in sentence for sentence in found.seen)
+
+
+def test_a_pendulum_of_three_arms(tmp_path: Path) -> None:
+    """Three bars were taken for a rope of 0.6 m through their four joints."""
+    t = np.arange(1201) / 200
+    swing = [0.6 * np.cos(4.0 * t), 0.7 * np.cos(4.0 * t + 0.3) + 0.1 * np.sin(9.0 * t), 0.9 * np.sin(11.0 * t + 0.4)]
+    ends = np.cumsum(
+        [
+            length * np.stack([np.sin(a), 0.0 * a, -np.cos(a)], axis=1)
+            for length, a in zip((0.25, 0.2, 0.15), swing, strict=True)
+        ],
+        axis=0,
+    )
+    x = np.concatenate([np.zeros((1, len(t), 3)), ends]).transpose(1, 0, 2) + np.array([0.1, 0.4, 1.0])
+    found, content = drafted(tmp_path, x, 200, 3e-4)
+    assert found.kind == "a triple pendulum"
+    assert [arm["name"] for arm in content["scene"]["arm"]] == ["upper", "middle", "lower"]
+    assert content["scene"]["arm"][1]["pivot"] == "upper" and content["scene"]["arm"][2]["pivot"] == "middle"
+    assert {"middle_inertia", "lower_inertia", "middle_friction"} < set(content["parameters"])
+
+
+def test_a_rope_on_a_floor_is_refused_with_where_its_configuration_is(tmp_path: Path) -> None:
+    """It was drafted as one that hangs in the air from its tail."""
+    t = np.maximum(np.arange(301) / RATE - 0.4, 0.0)[:, None]
+    s = np.linspace(0.0, 1.0, 11)
+    pulled = 0.12 * t**2
+    x = np.stack([s + pulled, 0.03 * np.sin(2.0 * t) * s, 0.03 * np.maximum(s - 0.8, 0.0) * np.minimum(t, 1.0)], axis=2)
+    with pytest.raises(sb.RecordingError, match=r"as a rope on a floor or a table does.*dragged_rope\.md"):
+        drafted(tmp_path, x)
+
+
+def test_the_axis_that_points_up_is_told_by_a_file(tmp_path: Path) -> None:
+    found, _ = drafted(tmp_path, kicked())
+    (said,) = [sentence for sentence in found.seen if "is taken as up" in sentence]
+    assert said.startswith("z is taken as up") and '{"gravity": [0, -9.81, 0]} or so into take.json' in said

@@ -149,6 +149,8 @@ def _looked_at(
     beyond = {hold.side: hold.beyond for hold in held}
     if found is not None:  # the cloth is stretched there too
         beyond |= {side: beyond[side] * found.length / found.first for side in ("left", "right") if side in beyond}
+    if any(hold.corners and hold.own for hold in held):  # who holds two corners has them in the hands
+        beyond |= dict.fromkeys(("left", "right"), 0.0)
     free = share(held) * pitches(flat)
     low, high = (
         np.array([beyond.get(side, free[SIDES[side][0]]) for side in sides])
@@ -156,7 +158,7 @@ def _looked_at(
     )
     width, height = (np.ptp(flat, axis=0) + low + high).tolist()
     at_rest = not s.static and not any(hold.moves for hold in held) and not is_slung
-    wind = _wind(s, own, [own[k] for k in row_of(flat, "top", apart)], up, density) if at_rest else None
+    wind = _wind(s, own, [own[k] for k in row_of(flat, held[0].side, apart)], up, density) if at_rest else None
     origin = place - axes.T @ low
     for edge in (hold.edge for hold in held if ride is None and not is_slung):
         if edge is not None:  # all frames show an edge at rest

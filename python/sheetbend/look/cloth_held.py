@@ -121,8 +121,8 @@ def holds(
     Args:
         own: its markers, which lie at `flat` (markers, 2) m.
         others: markers on no cloth.
-        sides: where it is held if no marker of a holder is near; of two sides that such a marker is beyond, one of
-            these counts.
+        sides: where it is held if no marker of a holder is near, and no other side stays alone; of two sides that such
+            a marker is beyond, one of these counts.
         bars: directions of bars by their markers, in place of that of the row beside each.
     """
     x, numbers = s.recording.positions, list(own)
@@ -147,6 +147,8 @@ def holds(
         sags = _sags(x, row)
         bar = None if sags or len(near) > 1 else bars.get(markers[0], tuple(_direction(x, row).tolist()))
         found.append(Hold(side, markers, sags, moves, beyond, False, along, bar))
+    if not found and len(sides) == 1:
+        sides = _at_rest(s, numbers, flat, apart) or sides
     for side in () if found else sides:
         row = [numbers[k] for k in row_of(flat, side, apart)]
         moves = not s.static and motion(x[:, row]) >= QUIET * moved
@@ -156,6 +158,12 @@ def holds(
         beyond = 0.0 if told is None else told.length
         found.append(Hold(side, markers, corners, moves, beyond, True, margin=told))
     return found
+
+
+def _at_rest(s: Seen, own: list[int], flat: Array, apart: float) -> tuple[str, ...]:
+    """The one side whose outer row stays where it is while the others move, as that of a flag; else none."""
+    resting = tuple(side for side in SIDES if {own[k] for k in row_of(flat, side, apart)} <= set(s.still))
+    return resting if len(resting) == 1 else ()
 
 
 def _on_bars(

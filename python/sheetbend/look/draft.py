@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import PurePosixPath
 
 import numpy as np
 
@@ -117,7 +118,12 @@ def _told(takes: Sequence[Take], up: int | None) -> list[str]:
         said.append(f"{'xyz'[up]} points up: gravity accelerates the markers along it")
     elif not first.told:
         axis = "xyz"[first.up]
-        said.append(f"{axis} is taken as up, because the file does not say it: change `gravity` if another axis is up")
+        gravity = [-9.81 if k == (1 if axis == "z" else 2) else 0 for k in range(3)]
+        beside = PurePosixPath(takes[0].file).with_suffix(".json").name
+        said.append(
+            f"{axis} is taken as up, because the file does not say it. If another axis is, write "
+            f'{{"gravity": {gravity}}} or so into {beside} beside the recording, and begin again'
+        )
     return said
 
 

@@ -1,4 +1,4 @@
-"""A pendulum in a recording: one or two arms on a pivot that stays, swinging in the plane of x and z."""
+"""A pendulum in a recording: one to three arms on a pivot that stays, swinging in the plane of x and z."""
 
 from __future__ import annotations
 
@@ -8,13 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from .seen import Seen
+from .seen import RIGID, Seen
 from .take import Description, Measured, Take
 from .text import table
 
 Array = np.ndarray
 FLAT, STRAIGHT = 0.02, 0.01  # of an arm: how far it may leave its plane, and how much its length may change
-PIECES = {1: (3.0, 5.0), 2: (2.0, 2.0)}  # s that are fitted and predicted at most, by the number of arms: two diverge
+PIECES = {1: (3.0, 5.0), 2: (2.0, 2.0), 3: (1.0, 1.0)}  # s that are fitted and predicted at most, by arms: two diverge
+ARMS = {1: ["arm"], 2: ["upper", "lower"], 3: ["upper", "middle", "lower"]}
+KINDS = {1: "a pendulum", 2: "a double pendulum", 3: "a triple pendulum"}
 FITTED, PREDICTED = 4, 4  # pieces
 LEAD = 0.1  # s, at the beginning of a predicted piece, that its start is fitted to
 SUBSTEP = 1 / 1600  # s, at most
@@ -23,14 +25,14 @@ LEAST_FRAMES = 20
 
 
 def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
-    """One or two arms; None where the markers are not those of a pendulum."""
+    """One to three arms; None where the markers are not those of a pendulum."""
     s = takes[0].seen
     joints = _joints(s)
     if joints is None or len(takes) > 1:
         return None
     r = s.recording
     x = r.positions
-    arms = ["arm"] if len(joints) == 2 else ["upper", "lower"]
+    arms = ARMS[len(joints) - 1]
     radii = [float(np.nanmean(_distance(x, a, b))) for a, b in pairwise(joints)]
     names = [r.markers[k] for k in joints]
     notes = [
@@ -61,13 +63,12 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
             "arm_drag": {},
         }
     else:
-        lines += table("[[scene.arm]]", _arm("upper", radii[0], pivot))
-        lines += table("[[scene.arm]]", _arm("lower", 2.2 * radii[1], "upper", 1.5 * radii[1]))
-        parameters = {
-            f"{arm}_{key}": dict[str, Any]()
-            for arm, keys in (("upper", ("first_moment",)), ("lower", ("first_moment", "inertia")))
-            for key in keys
-        } | {"upper_friction": {}, "lower_friction": {}, "lower_drag": {}}
+        for k, (arm, radius) in enumerate(zip(arms[:-1], radii, strict=False)):
+            lines += table("[[scene.arm]]", _arm(arm, radius, arms[k - 1] if k else pivot))
+        lines += table("[[scene.arm]]", _arm("lower", 2.2 * radii[-1], arms[-2], 1.5 * radii[-1]))
+        parameters = {f"{arm}_{key}": dict[str, Any]() for arm in arms for key in ("first_moment", "inertia")}
+        del parameters["upper_inertia"]  # the scale of all masses
+        parameters |= {f"{arm}_friction": {} for arm in arms} | {"lower_drag": {}}
     for arm in arms:
         lines += table(f"[scene.quantities.{arm}_zero]", {"scale": 1e-3}, {"scale": "m, of the marker's offset across"})
         parameters[f"{arm}_zero"] = {}
@@ -88,25 +89,35 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         parameters |= {f"{arm}_angle": {"private": True}, f"{arm}_rate": {"private": True}}
     for name, entries in parameters.items():
         lines += table(f"[parameters.{name}]", entries)
-    return Description(f"a {'double ' * (len(arms) == 2)}pendulum", notes, unknown, lines)
+    return Description(KINDS[len(arms)], notes, unknown, lines)
 
 
 def _joints(s: Seen) -> list[int] | None:
     """The pivot and the ends of the arms, in order."""
     x, count = s.recording.positions, len(s.recording.markers)
-    if not 2 <= count <= 3 or len(s.still) != 1 or len(s.recording.times) < LEAST_FRAMES:
+    if not 2 <= count <= 4 or len(s.still) != 1 or len(s.recording.times) < LEAST_FRAMES:
         return None
     if int(np.argmax(np.abs(s.gravity))) != 2:
         return None
     order, left = [s.still[0]], set(range(count)) - set(s.still)
     while left:
         steady = [k for k in left if np.nanstd(_distance(x, order[-1], k)) < STRAIGHT * s.apart[order[-1], k]]
+        if len(steady) > 1:  # arms that swing as one
+            steady = [k for k in steady if _rigid(s, order[-1], k)]
         if len(steady) != 1:
             return None
         order.append(steady[0])
         left.remove(steady[0])
+    if count == 4 and not all(_rigid(s, a, b) for a, b in pairwise(order)):  # a rope almost keeps these distances
+        return None
     off = np.nanmax(np.abs(x[:, order, 1] - np.nanmean(x[:, order[0], 1])))
     return order if off < FLAT * s.apart[order[0], order[1]] else None
+
+
+def _rigid(s: Seen, a: int, b: int) -> bool:
+    """Whether the distance of two markers varies by no more than noise makes it."""
+    spread = float(np.nanstd(_distance(s.recording.positions, a, b)))
+    return spread <= max(RIGID * s.noise, 1e-3 * float(s.apart[a, b]))
 
 
 def _distance(x: Array, a: int, b: int) -> Array:
@@ -138,12 +149,12 @@ def _states(x: Array, times: Array, joints: list[int]) -> tuple[Array, Array]:
 
 def _pieces(s: Seen, take: Take, arms: int) -> list[tuple[dict[str, Any], float]]:
     """Recordings cut from one. Of one arm the first part is fitted, in pieces, and the rest is predicted from its first
-    moments. Of two arms, fitted and predicted pieces take turns: friction is seen only where the swing has become
+    moments. Of more arms, fitted and predicted pieces take turns: friction is seen only where the swing has become
     small, and wide swings magnify what the model lacks."""
     t = s.recording.times
     start, stop = float(t[0]), float(t[-1])
     longest, most = PIECES[arms]
-    if arms == 2:
+    if arms > 1:
         turn = (stop - start) / FITTED
         length, room = min(longest, turn / 2), turn / 2
         fitted = [start + k * turn for k in range(FITTED)]

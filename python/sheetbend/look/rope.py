@@ -14,6 +14,7 @@ from ..errors import RecordingError
 from .end_load import loaded_end
 from .held import Held, gripping, held, parts
 from .line import forks, plane, snapped, tangent
+from .lying import lies
 from .seen import Seen
 from .take import Description, Measured, Take, max_gap
 from .text import joined, table
@@ -64,6 +65,12 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     if len(order) < 3:
         return None
     _unbranched(s, order)
+    if lies(s, order):
+        fix = (
+            "take the configuration in docs/tutorials/dragged_rope.md, with a table and its friction, for your markers"
+        )
+        names = joined(s.recording.markers[k] for k in order)
+        raise RecordingError("markers", "slide along at one height, as a rope on a floor or a table does", names, fix)
     found = _at_rest(s, order) if s.static else held(s, hand, order)
     if len(found.order) < 3:
         return None
