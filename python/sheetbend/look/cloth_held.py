@@ -51,11 +51,6 @@ class Hold:
     tool: str | None = None
     margin: Margin | None = None
 
-    @property
-    def edge(self) -> Edge | None:
-        """The edge beyond the cloth's own row, where the motion shows it."""
-        return None if self.margin is None else self.margin.edge
-
     def tables(self, names: Sequence[str], s: Seen) -> tuple[list[Any], list[Any], list[Any]]:
         """Sets that are pinned, sets, and grips of a cloth."""
         if not self.corners:
@@ -69,6 +64,11 @@ class Hold:
         if not self.moves:
             return list(by_set), sets, []
         return [], sets, [{"set": name, "markers": markers} for name, markers in by_set.items()]
+
+    @property
+    def edge(self) -> Edge | None:
+        """The edge beyond the cloth's own row, where the motion shows it."""
+        return None if self.margin is None else self.margin.edge
 
 
 def share(held: Sequence[Hold]) -> float:
