@@ -216,7 +216,14 @@ class Experiment:
         return np.asarray(times - self.t0 + offset)
 
     def observed(self, recording: Recording) -> dict[str, Any]:
-        """Observations for the compiled core; the scene's clock starts at 0."""
+        """Observations for the compiled core; the scene's clock starts at 0.
+
+        Args:
+            recording: the experiment's, or a part of it, with the compared markers only.
+
+        Raises:
+            RecordingError: the scene starts after the first frame.
+        """
         times = np.zeros(1) if self.static else recording.times - self.t0
         if not self.static and times[0] < -1e-9:
             raise RecordingError(

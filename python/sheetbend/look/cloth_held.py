@@ -51,11 +51,6 @@ class Hold:
     tool: str | None = None
     margin: Margin | None = None
 
-    @property
-    def edge(self) -> Edge | None:
-        """The edge beyond the cloth's own row, where the motion shows it."""
-        return None if self.margin is None else self.margin.edge
-
     def driving(self, s: Seen) -> list[int]:
         """The markers whose motion moves the cloth."""
         if not self.moves or self.tool is not None:
@@ -75,6 +70,11 @@ class Hold:
         if not self.moves:
             return list(by_set), sets, []
         return [], sets, [{"set": name, "markers": markers} for name, markers in by_set.items()]
+
+    @property
+    def edge(self) -> Edge | None:
+        """The edge beyond the cloth's own row, where the motion shows it."""
+        return None if self.margin is None else self.margin.edge
 
 
 def share(held: Sequence[Hold]) -> float:

@@ -96,7 +96,18 @@ class Equilibrium:
         forces_bar: Mapping[str, ArrayLike] | None = None,
         pressures_bar: Mapping[str, float] | None = None,
     ) -> np.ndarray:
-        """The same by the flat inputs (`CompiledScene.inputs`), places and rest geometry among them."""
+        """Gradient of a loss with respect to the flat inputs (`CompiledScene.inputs`), which include places and rest
+        geometry.
+
+        Args:
+            positions_bar, forces_bar, pressures_bar: as for `gradient`.
+
+        Returns:
+            (inputs,), in the layout of `CompiledScene.layout`.
+
+        Raises:
+            SceneError: wrong shapes, no such group or volume.
+        """
         x_bar = (
             None
             if positions_bar is None

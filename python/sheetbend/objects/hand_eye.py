@@ -114,6 +114,7 @@ class HandEye:
         """Give particles a motion in the recording's frame that the correction moves.
 
         Args:
+            scene: of the particles.
             particles: (k,) indices.
             times: (knots,) s, see `Scene.drive`.
             motion: (knots, k, 3) m, without the correction.

@@ -219,8 +219,9 @@ class Parameters(Mapping[str, Parameter]):
         """Turn each private parameter into one per recording, named `name[recording]`; shared ones stay.
 
         Args:
-            own: by expanded name, where private parameters without an initial value start; those that are in
-                neither are left out.
+            recordings: names.
+            own: start of private parameters without an initial value, by expanded name and in the parameter's unit.
+                A private parameter without either is left out.
         """
         own = own or {}
         expanded: list[Parameter] = []

@@ -113,7 +113,15 @@ class Cloud(Recording):
         return self._with([self.positions[self.mask]], self.times[:1])
 
     def thinned(self, most: int, seed: int = 0) -> Cloud:
-        """At most so many points of each frame, drawn at random: the time of a fit grows with their number."""
+        """The cloud with a part of its points: the time of a fit grows with their number.
+
+        Args:
+            most: points per frame, drawn at random.
+            seed: of the draw.
+
+        Raises:
+            RecordingError: `most` is not positive.
+        """
         if most < 1:
             raise RecordingError("most", "must be positive", most, "give a number of points, such as 800")
         generator = np.random.default_rng(seed)

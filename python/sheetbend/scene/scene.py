@@ -331,7 +331,7 @@ class Scene(SelfTouchingScene):
             friction: Coulomb's coefficient (`<name>_friction`); 0 is smooth.
             radius: m, of a rope, or half the thickness of cloth (`<name>_contact_radius` unless zero).
             stiffness: N/m per particle (`<name>_contact_stiffness`). By default rigid: h^2 g/1000 deep under weight.
-            restitution: 0 to 1 (`<name>_restitution`), the speed after an impact over that before; by default 0.
+            restitution: 0 to 1 (`<name>_restitution`), the normal speed after an impact over that before; by default 0.
             dissipation: s/m (`<name>_contact_dissipation`), of a contact with a stiffness: its push is larger by this
                 times the speed at which it goes in, and smaller on the way out (Hunt & Crossley 1975). Elastic by
                 default.
@@ -340,6 +340,7 @@ class Scene(SelfTouchingScene):
                 whole, which must be joined to nothing.
             points: of a body, (n, 3) m in its frame or the vertices of a mesh: `sb.box_corners(sides)`, or with a
                 `radius` the middle of a ball. They touch, edges and faces between them do not.
+
         Raises:
             SceneError: numbers out of range; a body without points; when it is compiled: a start inside, restitution
                 of what is held and soft.
