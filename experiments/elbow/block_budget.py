@@ -18,7 +18,7 @@ from block_landings import FOUND, Toss, centers_apart, errors, halves, of_both, 
 from sheetbend.arrays.rotations import matrices_of, quaternions_of, rotation_matrix
 
 NOISE = (3e-5, 4e-4, 7e-4)  # m, rad, rad: of places, attitudes and angles of the hinge, from their third differences
-DRAWS = 6
+DRAWS = 3
 LATER = (0, 1, 3, 6, 10, 20, 40)  # frames after the last one of free flight
 OTHERWISE = {
     "first_table_friction": (0.8, 1.25),

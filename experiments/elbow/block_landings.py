@@ -28,13 +28,13 @@ TOUCHING = sb.box_corners(SIDES / SCALE)
 CORNERS = sb.box_corners(SIDES)  # as the source has them
 BLOCKS = ("first", "second")
 BOX = dict(enumerate(np.diag(sb.Inertia.box(MASS, SIDES / SCALE).matrix).tolist(), start=1))  # kg m^2, homogeneous
-STIFFNESS = 6e4  # N/m, of a corner
-FOUND = {  # of the first block, and alike of the second
-    "first_table_friction": 0.168,
-    "first_table_contact_dissipation": 1.95,  # s/m
-    "rounding": 2.67e-3,  # m
-    "hinge_viscosity": 2.2e-4,  # N m s
-    **{f"first_inertia_{k}": 1.117 * moment for k, moment in BOX.items()},
+STIFFNESS = 2.5e5  # N/m, of a corner
+FOUND = {  # of the first block, and alike of the second; moments of inertia and viscosity from flights between impacts
+    "first_table_friction": 0.17,
+    "first_table_contact_dissipation": 1.0,  # s/m
+    "rounding": 3e-4,  # m
+    "hinge_viscosity": 4e-4,  # N m s
+    **{f"first_inertia_{k}": ratio * BOX[k] for k, ratio in zip(BOX, (1.44, 1.20, 1.33), strict=True)},
 }
 
 

@@ -1,38 +1,58 @@
-"""What contacts tell of two tossed blocks on a hinge: a fit to the first frames after contact, and a search over whole
-paths, which finds the numbers of `block_landings.py`.
+"""What tosses tell of two blocks on a hinge: a fit to their flights, also those between impacts, which finds moments of
+inertia and the viscosity of the hinge, a fit to the first frames after contact, and a search over whole paths.
 
-    python experiments/elbow/block_landings_study.py [fit | search]
+    python experiments/elbow/block_landings_study.py [flights | fit | search]
 
-Both see every other toss that has seven frames of free flight or more. The fit takes one minute of processor time, the
-search as long.
+All see every other toss; the last two those of them that have seven frames of free flight or more. Each takes one to
+two minutes of processor time. `block_landings.py` has the numbers of the first, and friction, dissipation and rounding
+with which whole paths are predicted best.
 """
 
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
+from itertools import pairwise
 
+import blocks
 import numpy as np
 import sheetbend as sb
-from block_landings import BLOCKS, BOX, FEWEST, SCALE, SOLVER, TOUCHING, Toss, errors, halves, of_both, other, scene_of
-from blocks import CORNERS
+from block_landings import (
+    BLOCKS,
+    BOX,
+    DOWN,
+    FEWEST,
+    SCALE,
+    TOUCHING,
+    Toss,
+    errors,
+    halves,
+    of_both,
+    other,
+    scene_of,
+)
+from blocks import CORNERS, RATE, Flight
 from scipy.optimize import minimize
 from sheetbend.arrays.rotations import matrices_of, quaternions_of
 
-AFTER = 10  # frames from the end of free flight on that the fit sees
+PULL = 9.0  # m/s^2, by which gravity may miss the acceleration of a flight
+LEAST = 7  # frames of a flight
+LONG, FAST = 12, 4.0  # frames, rad/s of the hinge: flights that are either count
+AFTER = 6  # frames from the end of free flight on that the fit sees
+FINE = sb.Solver(h=1 / (16 * RATE), method="implicit")  # of that fit
 COMPARED = CORNERS / SCALE
 SIGMA = 1e-3  # m, of a corner: what the model may be off by
 FROM = {  # where the fit starts; the second block has the numbers of the first
     "first_table_friction": 0.2,
-    "first_table_contact_dissipation": 2.0,
-    "rounding": 2e-3,
+    "first_table_contact_dissipation": 0.6,
+    "first_table_contact_stiffness": 2e5,
+    "rounding": 1e-3,
     "hinge_viscosity": 1e-4,
-    **{f"first_inertia_{k}": 1.3 * moment for k, moment in BOX.items()},
+    **{f"first_inertia_{k}": 1.2 * moment for k, moment in BOX.items()},
     "table_z": 0.0,
     "stretch": 0.0,
 }
 SIZES = {"rounding": 2e-3, "table_z": 1e-3, "stretch": 0.01}
-
-
 SEARCH = {  # start, and the first step in its logarithm; heavier: moments of inertia over those of homogeneous blocks
     "first_table_friction": (0.17, -0.25),
     "first_table_contact_dissipation": (2.0, 0.5),
@@ -40,6 +60,31 @@ SEARCH = {  # start, and the first step in its logarithm; heavier: moments of in
     "hinge_viscosity": (2e-4, 1.0),
     "heavier": (1.1, 0.2),
 }
+
+
+def between(toss: Toss) -> list[Flight]:
+    """The parts of a toss in which nothing but gravity acts and all corners are 4 mm above the table."""
+    seen = (toss.positions, matrices_of(toss.quaternions)), toss.second()
+    corners = [(x[:, None] + np.einsum("fab,kb->fka", frames, TOUCHING))[..., 2].min(axis=1) for x, frames in seen]
+    low = np.min(corners, axis=0)[1:-1] < seen_height(toss) + 0.004
+    pull = np.linalg.norm(np.diff(toss.middle(), 2, axis=0) * RATE**2 - DOWN, axis=1)
+    edges = [-1, *np.flatnonzero(low | (pull > PULL)), len(pull)]
+    parts = [slice(a + 1, b + 2) for a, b in pairwise(edges) if b - a + 1 >= LEAST]
+    return [
+        Flight(f"{toss.name} {p.start}", toss.times[p] - toss.times[p.start], toss.positions[p], toss.quaternions[p], a)
+        for p in parts
+        if len(a := toss.angles[p]) >= LONG or abs(np.polyfit(toss.times[p], a, 1)[0]) > FAST
+    ]
+
+
+def fitted_flights(group: list[Toss]) -> sb.FitResult:
+    """Gravity, the viscosity of the hinge and the moments of inertia, alike of both blocks, from all their flights."""
+    moments = [sb.Parameter(name=f"first_inertia_{k}", initial=1.5 * moment) for k, moment in BOX.items()]
+    tied = [sb.Parameter(name=other(moment.name), tied_to=moment.name) for moment in moments]
+    flights = [flight for toss in group for flight in between(toss)]
+    experiments = [replace(blocks.experiment(f), sigma=2e-4, loss="soft_l1", loss_scale=2.0) for f in flights]
+    free = [*blocks.parameters(["gravity", "hinge_viscosity"]), *moments, *tied]
+    return sb.fit(experiments, parameters=free, windows=[], refine=False, profiles=False)
 
 
 def seen_height(toss: Toss) -> float:
@@ -62,7 +107,7 @@ def experiment(toss: Toss) -> sb.Experiment:
     )
     markers = [one for block in BLOCKS for one in sb.on_body(scene.bodies[block], COMPARED)]
     return sb.Experiment(
-        scene=scene, recording=recording, markers=markers, solver=SOLVER, sigma=SIGMA, loss="soft_l1", loss_scale=2.0
+        scene=scene, recording=recording, markers=markers, solver=FINE, sigma=SIGMA, loss="soft_l1", loss_scale=2.0
     )
 
 
@@ -80,7 +125,7 @@ def fitted(group: list[Toss]) -> sb.Fit:
     ]
     tied = [sb.Parameter(name=other(name), tied_to=name) for name in FROM if name.startswith("first")]
     experiments = [experiment(toss) for toss in group]
-    return sb.fit(experiments, parameters=[*free, *tied], windows=[], refine=False, profiles=False, tolerance=1e-6)
+    return sb.fit(experiments, parameters=[*free, *tied], windows=[], refine=False, profiles=False, tolerance=1e-4)
 
 
 def searched(group: list[Toss], runs: int) -> dict[str, float]:
@@ -107,12 +152,20 @@ def searched(group: list[Toss], runs: int) -> dict[str, float]:
 
 
 def main(what: str) -> None:
-    group = [toss for toss in halves()[0] if toss.free >= FEWEST]
-    if what == "fit":
+    seen = halves()[0]
+    group = [toss for toss in seen if toss.free >= FEWEST]
+    if what == "flights":
+        found = fitted_flights(seen)
+        for name in ("gravity", "hinge_viscosity", *(f"first_inertia_{k}" for k in BOX)):
+            one, unit = found[name], BOX[int(name[-1])] if "inertia" in name else 1.0
+            half = np.inf if one.half_width is None else one.half_width
+            print(f"{name:16s} {one.value / unit:9.4g} +- {half / unit:8.2g}  {one.verdict}")
+        print("moments of inertia are over those of a homogeneous block")
+    elif what == "fit":
         print(fitted(group).report())
     else:
         searched(group, 22)
 
 
 if __name__ == "__main__":
-    main(*(sys.argv[1:] or ["fit"]))
+    main(*(sys.argv[1:] or ["flights"]))
