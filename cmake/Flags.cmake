@@ -11,6 +11,11 @@ set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 add_compile_options(-ffp-contract=off -fno-math-errno -Wall -Wextra)
 # GCC notes that packs as wide as a vector register have no stable calling convention; none crosses a public interface.
 add_compile_options(-Wno-psabi)
+# GCC looks for garbage from 128 MB on, which takes 5 to 10 % of its time; from 600 MB on it takes up to 220 MB more. Not with a compiler cache, where
+# another option makes every entry useless.
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  add_compile_options(--param=ggc-min-heapsize=600000)
+endif()
 
 option(SHEETBEND_WERROR "Warnings in our own files are errors" OFF)
 if(SHEETBEND_WERROR)
