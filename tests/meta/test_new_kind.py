@@ -68,13 +68,13 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def compiled(tree: Path, name: str, *more: str) -> Path:
-    """The object of the source that ends with `name`, compiled as the build would."""
+    """The object of the source that ends with `name`, compiled as the build would, but as fast as the compiler can."""
     commands = json.loads((tree / "build/compile_commands.json").read_text())
     (entry,) = [c for c in commands if c["file"].endswith(name)]
     command = shlex.split(entry["command"])
     at = command.index("-o") + 1
     command[at] = str(tree / (name.replace("/", "_") + ".o"))
-    run([*command, *more], cwd=entry["directory"])
+    run([*command, *more, "-O0"], cwd=entry["directory"])
     return Path(command[at])
 
 
@@ -102,7 +102,7 @@ def known(tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     module = tree / f"kinds_alone{sysconfig.get_config_var('EXT_SUFFIX')}"
     include = [f"-I{tree}", f"-I{pybind11.get_include()}", f"-I{sysconfig.get_path('include')}"]
     sources = [str(tree / "python/bindings/core_kinds.cpp"), str(TOY / "module.cpp")]
-    run(["c++", "-std=c++20", "-O1", "-shared", "-fPIC", *include, *sources, "-o", str(module)])
+    run(["c++", "-std=c++20", "-O0", "-shared", "-fPIC", *include, *sources, "-o", str(module)])
     spec = importlib.util.spec_from_file_location("kinds_alone", module)
     assert spec is not None and spec.loader is not None
     alone = importlib.util.module_from_spec(spec)

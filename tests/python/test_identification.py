@@ -126,7 +126,7 @@ def test_what_a_model_misses_stands_above_the_table(sigma):
 
 
 @pytest.mark.slow
-def test_intervals_mean_what_they_say():
+def test_intervals_mean_what_they_say(intervals_alone):
     """Over seeds: the estimates scatter as sigma^2 (J'J)^-1 says, and 95 % intervals hold the truth 92 to 98 times of
     100."""
     sigma, seeds, s = 2e-3, 400, sb.Solver(h=1 / 60)
@@ -147,10 +147,15 @@ def test_intervals_mean_what_they_say():
     precision = J.T @ J  # internal coordinates: logarithms; residuals are in units of sigma
     rng = np.random.default_rng(1)
     scatter, covered = np.zeros((2, 2)), np.zeros(2)
-    for _ in range(seeds):
-        found = sb.fit(
-            experiment(clean + sigma * rng.standard_normal(clean.shape)), parameters=list(truth), refine=False
-        )
+    for seed in range(seeds):
+        drawn = experiment(clean + sigma * rng.standard_normal(clean.shape))
+        found = sb.fit(drawn, parameters=list(truth), refine=False)
+        if seed == 0:
+            intervals_alone()
+            alone = sb.fit(drawn, parameters=list(truth), refine=False)
+            assert [(e.value, e.lower, e.upper) for e in alone.result.estimates] == [
+                (e.value, e.lower, e.upper) for e in found.result.estimates
+            ]
         error = np.array([math.log(found[name].value / truth[name]) for name in truth])
         scatter += np.outer(error, error) / seeds
         covered += [found[name].lower <= truth[name] <= found[name].upper for name in truth]
