@@ -26,6 +26,7 @@ from .windows import STEPS, TOLERANCE, along, chosen, cut
 AUTO = "auto"
 NEAR_TOLERANCE = 1e-3  # of the cost: what is left is for the optimizer
 MUCH, DONE = 0.25, 1e-3  # of the cost: what a first step promises where the start is near, and at the minimum
+KEPT = 0.9  # of what such a step promises, that it takes off
 NOISE = 2.0  # sigmas: a start whose residuals are no larger is near, too
 
 
@@ -267,7 +268,7 @@ class _Way:
         noise = walk.cost < 0.5 * NOISE**2 * self.problem.core.data_rows
         if walk.promised < DONE:
             return noise or walk.free
-        return walk.free and (noise or walk.promised > MUCH)
+        return walk.free and (noise or (walk.promised > MUCH and walk.taken > KEPT * walk.promised))
 
     def _through(self, whole: FitProblem, lengths: Sequence[float], u: np.ndarray) -> Approach:
         """Fit window after window; where one diverges at the values of the one before, one in between comes first.
