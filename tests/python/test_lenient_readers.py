@@ -190,3 +190,23 @@ def test_a_marker_that_comes_back_elsewhere_is_another_one(tmp_path: Path) -> No
     take_of_motive(tmp_path / "take.csv", t, far)
     got = Recording.load(tmp_path / "take.csv")
     assert len(got.markers) == 3 and "joined" not in got.metadata
+
+
+def test_zeros_of_a_trc_file_are_lost_markers(tmp_path: Path) -> None:
+    head = [
+        "PathFileType\t4\t(X/Y/Z)\ttake.trc",
+        "DataRate\tUnits",
+        "100\tmm",
+        "Frame#\tTime\ttip\t\t",
+        "\t\tX1\tY1\tZ1",
+    ]
+    rows = [f"{k + 1}\t{k / 100}\t" + ("0\t0\t0" if k in (7, 8) else f"{k}\t900\t100") for k in range(30)]
+    (tmp_path / "take.trc").write_text("\n".join([*head, *rows]) + "\n")
+    assert np.flatnonzero(~Recording.load(tmp_path / "take.trc").mask[:, 0]).tolist() == [7, 8]
+
+
+@pytest.mark.parametrize(("name", "words"), [("take.mat", "loadmat"), ("take.bag", "export the poses as CSV")])
+def test_files_that_are_not_read_say_how_to_convert_them(tmp_path: Path, name: str, words: str) -> None:
+    (tmp_path / name).write_bytes(b"x")
+    with pytest.raises(RecordingError, match=rf"suffix that no reader knows.*{words}"):
+        Recording.load(tmp_path / name)

@@ -32,6 +32,20 @@ FORMATS: dict[str, ModuleType] = {
     ".txt": csv,
 }
 
+ELSEWHERE = {
+    ".mat": "in Python: np.savez('take.npz', positions=..., times=...) of what scipy.io.loadmat gives, or in MATLAB: "
+    "writetable to a .csv with the columns time,tip_x,tip_y,tip_z,...",
+    ".xlsx": "save the sheet as CSV",
+    ".xls": "save the sheet as CSV",
+    ".bag": "export the poses as CSV, as `rostopic echo -p` does",
+    ".db3": "export the poses as CSV",
+    ".mcap": "export the poses as CSV",
+    ".bvh": "export the markers as C3D, TRC or CSV; a skeleton holds none",
+    ".fbx": "export the markers as C3D, TRC or CSV; a skeleton holds none",
+    ".tak": "export the take as CSV in Motive",
+}
+"""What to do about files that laboratories have and that are not read, by suffix."""
+
 
 def read(path: Path, units: str | None = None) -> MarkerData:
     """Read the recording at path and the JSON beside it; see `Recording.load`."""
@@ -70,7 +84,7 @@ def _format(path: Path) -> ModuleType:
         return FORMATS[path.suffix.lower()]
     except KeyError:
         known = " or ".join(FORMATS)
-        fix = f"use a file that ends in {known}"
+        fix = ELSEWHERE.get(path.suffix.lower(), f"use a file that ends in {known}")
         raise RecordingError("path", "has a suffix that no reader knows", str(path), fix) from None
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...arrays.timeseries import Array
 from ...errors import RecordingError
+from .lost import without_zeros
 
 Row = tuple[int, list[str]]  # line number in the file, from 1, and the cells
 
@@ -56,8 +57,10 @@ def points_seen(
     path: Path, rows: Sequence[Row], names: Sequence[str], first: Sequence[int]
 ) -> tuple[Array, tuple[str, ...]]:
     """Points (rows, k, 3) whose x, y, z stand from columns `first` on, and their names, without those never seen."""
-    x = np.array([[[number(path, row, cells[k + axis]) for axis in range(3)] for k in first] for row, cells in rows])
-    seen = ~np.isnan(x[:, :, 0]).all(axis=0)
+    x = without_zeros(
+        np.array([[[number(path, row, cells[k + axis]) for axis in range(3)] for k in first] for row, cells in rows])
+    )
+    seen = np.any(np.isfinite(x[:, :, 0]), axis=0)
     return x[:, seen], tuple(names[k] for k, ever in zip(first, seen, strict=True) if ever)
 
 
