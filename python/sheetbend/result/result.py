@@ -38,8 +38,7 @@ class Estimate:
         discretization: half-width of what the time step, the mesh and sweeps leave open, see `FitResult.refits`; 0 when
             that was not measured.
         systematic: half-width of what else the interval counts; 0 when nothing.
-        verdict: one of `VERDICTS`.
-        words: the verdict as a sentence.
+        verdict, words: one of `VERDICTS`, and as a sentence.
         moved: how far the value was moved to the limit of short substeps and fine meshes, in `unit`; it is contained in
             `value`.
     """
@@ -81,10 +80,8 @@ class Premise:
         name: of a quantity, or such as "gravity toward x", "clamps along z", "markers".
         value: in `unit`; None for what is a place or a direction.
         off_by: the error, in `unit`, whose effect is told; `words` says it, such as "1 %".
-        moved: of each fitted parameter that is determined, in its unit, by that error (of several independent errors
-            the root of the sum of squares).
-        leaves: what that error leaves in the residuals, which no parameter takes up: root of the sum of squares, in
-            sigma. 0 where the residuals are not asked for it.
+        moved: of each determined parameter, in its unit, by that error (of several, the root of the sum of squares).
+        leaves: root of the sum of squares that it leaves in the residuals, in sigma; 0 where they are not asked for it.
         sd: its standard deviation in `unit`, which then counts in the intervals; None where none was given.
     """
 
