@@ -1,7 +1,7 @@
 """Damping in elements that a model gives a stiffness and no damping.
 
 Kelvin-Voigt damping of a time constant, of a third of a frame interval, of a whole one and of three: what a motion that
-was recorded at these intervals may show.
+was recorded at these intervals may show. Or a time constant that is fitted along.
 """
 
 from __future__ import annotations
@@ -13,8 +13,11 @@ import numpy as np
 from ..arrays.timeseries import Array
 from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
+from ..quantities.parameters import Parameter, Parameters
+from ..quantities.quantities import Quantity, Term
 from ..scene.scene import Scene
 
+DAMPING = Parameter(name="damping", initial=1.0, log=True)  # in intervals between frames
 FRAMES = (1 / 3, 1.0, 3.0)  # intervals between frames: the time constants that are tried
 
 
@@ -36,25 +39,34 @@ def with_damping(problem: FitProblem, u: Array, frames: float, only: str = "") -
     theta, slots, _ = problem.known(u)
     return problem.of(
         [
-            e if e.static else _damped(e, theta[own], frames * float(np.median(np.diff(recording.times))), only)
+            e if e.static else _damped(e, theta[own], float(np.median(np.diff(recording.times))), frames, only)
             for e, own, recording in zip(problem.experiments, slots, problem.recordings, strict=True)
         ]
     )
 
 
-def _damped(e: Experiment, theta: Array, time: float, only: str) -> Experiment:
-    """With Kelvin-Voigt damping of a time constant [s] in its undamped groups: the force per rate is that time over the
-    compliance."""
+def with_free_damping(problem: FitProblem, u: Array, only: str) -> FitProblem:
+    """The same, with the frame intervals as one more parameter, the last one."""
+    more = with_damping(problem, u, 1.0, only)
+    given = Parameters([*problem.given.values(), DAMPING])
+    every = Parameters([*problem.parameters.values(), DAMPING])
+    return FitProblem(more.experiments, given, problem.recordings, problem.threads, every)
+
+
+def _damped(e: Experiment, theta: Array, interval: float, frames: float, only: str) -> Experiment:
+    """With Kelvin-Voigt damping in its undamped groups, of so many intervals [s] between frames: the force per rate is
+    that time over the compliance."""
     bare = [k for k in undamped(e.scene) if only in ("", e.scene.groups[k].name)]
     at, _ = e.scene.compiled.layout["compliance"]
     compliance = e.scene.compiled.inputs(theta)[at:]
-    scene = e.scene.shallow()
-    scene.groups = list(scene.groups)
+    scene, name = e.scene.shallow(), DAMPING.name
+    scene.groups, scene.terms = list(scene.groups), list(scene.terms)
+    scene.quantities = {**scene.quantities, name: Quantity(name, frames, "")}
     first = 0
     for k, g in enumerate(e.scene.groups):
-        own = compliance[first : first + len(g.particles)]
+        own = first + np.flatnonzero(compliance[first : first + len(g.particles)] > 0.0)
         first += len(g.particles)
         if k in bare:
-            damping = np.divide(time, own, out=np.zeros(len(own)), where=own > 0.0)
-            scene.groups[k] = replace(g, damped=True, damping=damping)
+            scene.groups[k] = replace(g, damped=True, damping=np.zeros(len(g.particles)))
+            scene.terms.append(Term("damping", own, interval / compliance[own], ((name, "identity"),)))
     return replace(e, scene=scene)

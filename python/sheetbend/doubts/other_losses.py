@@ -7,10 +7,15 @@ three times its size, and elements that have a stiffness and no damping are give
 itself (`absent_damping`). Contacts that come to rest at once are given a restitution (`absent_bounce`), and from the
 best of those tried on it is fitted along. What two Gauss-Newton steps leave then decides: a model that is wrong in
 another way leaves nearly as much with any loss. States of motions in windows take as many steps as the parameters do.
+
+A stiffness may have grown several times to make up for the damping that is missing, as that of a cloth that is drawn
+over a table does. Two steps do not lead back from there. So where nothing is found of motions with contacts, each kind
+of element that has no damping is given one that is fitted along, by a search of its own.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -19,14 +24,17 @@ import numpy as np
 from ..arrays.timeseries import Array
 from ..errors import SheetbendError
 from ..experiment.cut import in_steps
+from ..experiment.experiment import Experiment
+from ..minimum.optimizers import refit
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
 from ..statistics.gauge import RANK_TOLERANCE
 from .absent_bounce import SIZES as BOUNCES
 from .absent_bounce import has_no_bounce, with_bounce, with_free_bounce
-from .absent_damping import FRAMES, undamped, with_damping
+from .absent_damping import FRAMES, undamped, with_damping, with_free_damping
 from .directions import LEVEL, chance_of_drop, noise_in, rows_of, tied
 from .held_losses import held_names, of_size
+from .losses_at_zero import touches
 
 Says = Callable[[Sequence[str], str], str]
 """What it says of the model that another loss leaves less: by names of motions, and by how much less."""
@@ -36,6 +44,7 @@ LESS = 0.6
 """Of what a fit leaves beyond noise: by so much less another loss must leave. It is 0.98 to 1 less where 30 ms of
 damping were given as 90, and 0.63 to 1 where they were missing. It is at most 0.33 where a length, a clamp, gravity or
 the kind of drag was wrong, and 0.53 where the mesh was coarse (measured)."""
+SEARCHED, TOLERANCE = 30, 1e-3  # iterations at most of a search with a damping, and of its cost where it ends
 STEP = 1.0  # internal: the largest step that is tried
 
 
@@ -77,14 +86,23 @@ def other_losses(problem: FitProblem, u: Array) -> dict[str, str]:
         *((says, _reached(more, u, J, groups)) for more, says in _tried(stepping, u, groups)),
         *_bounces(stepping, u, J, groups),
     ]
-    for says, end in tried:
+
+    def ask(says: Says, end: _End | None, tests: int) -> None:
         after = None if end is None else end.r
         for k, group in enumerate(groups):
             if after is None or (share := _less(group, after)) <= max(LESS, best[k][0] if k in best else 0.0):
                 continue
             drop = group.left - float(after[group.mine] @ after[group.mine])
-            if chance_of_drop(problem, u, after, group.mine, drop) < LEVEL / len(tried):
+            if chance_of_drop(problem, u, after, group.mine, drop) < LEVEL / tests:
                 best[k] = share, says
+
+    for says, end in tried:
+        ask(says, end, len(tried))
+    names = [] if best else _undamped(problem, groups, only=touches)
+    for name in names:
+        if len(best) == len(groups):
+            break
+        ask(_lacks_damping(name), _searched(with_free_damping(stepping, u, name), u), len(tried) + len(names))
     return {
         name: says(
             [problem.experiments[i].name for i in groups[k].motions],
@@ -115,10 +133,27 @@ def _tried(problem: FitProblem, u: Array, groups: list[_Group]) -> Iterator[tupl
         if any(name in scene.quantities for scene in scenes):
             for times, (size, share) in SIZES.items():
                 yield of_size(problem, name, times), _is_given(name, size, share)
-    bare = list(dict.fromkeys(scene.groups[k].name for scene in scenes for k in undamped(scene)))
+    bare = _undamped(problem, groups)
     for only in (*([""] if bare else []), *(bare if len(bare) > 1 else [])):
         for frames in FRAMES:
             yield with_damping(problem, u, frames, only), _lacks_damping(only)
+
+
+def _undamped(problem: FitProblem, groups: list[_Group], only: Callable[[Experiment], bool] | None = None) -> list[str]:
+    """Names of what has a stiffness and no damping."""
+    motions = [problem.experiments[i] for group in groups for i in group.motions]
+    scenes = [e.scene for e in motions if only is None or only(e)]
+    return list(dict.fromkeys(scene.groups[k].name for scene in scenes for k in undamped(scene)))
+
+
+def _searched(free: FitProblem, u: Array) -> _End | None:
+    """Where a search ends that begins at u (free - 1,) with a damping of a third of a frame interval."""
+    try:
+        end = refit(free, np.append(u, math.log(FRAMES[0])), "auto", SEARCHED, TOLERANCE)
+        ok, r, _ = free.evaluate(end.u, jacobian=False)
+    except SheetbendError:
+        return None
+    return _End(end.u, r) if ok else None
 
 
 def _bounces(problem: FitProblem, u: Array, J: Array, groups: list[_Group]) -> Iterator[tuple[Says, _End | None]]:
