@@ -216,3 +216,14 @@ def test_the_axis_that_points_up_is_told_by_a_file(tmp_path: Path) -> None:
     found, _ = drafted(tmp_path, kicked())
     (said,) = [sentence for sentence in found.seen if "is taken as up" in sentence]
     assert said.startswith("z is taken as up") and '{"gravity": [0, -9.81, 0]} or so into take.json' in said
+
+
+def test_a_pendulum_in_millimeters(tmp_path: Path) -> None:
+    """The draft did not name the unit that it had taken, and did not run."""
+    t = np.arange(1001) / 200
+    angle = 0.6 * np.cos(5.0 * t)
+    end = np.stack([250.0 * np.sin(angle), 0.0 * t, 750.0 - 250.0 * np.cos(angle)], axis=1)
+    x = np.stack([np.broadcast_to([0.0, 0.0, 750.0], end.shape), end], axis=1)
+    recording = sb.Recording(1e-3 * x, t, name="take")
+    text = draft([Take(seen(recording), "take.csv", "mm")], "take").text
+    assert {part["units"] for part in tomllib.loads(text)["recording"]} == {"mm"}
