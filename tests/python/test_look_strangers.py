@@ -216,3 +216,28 @@ def test_the_axis_that_points_up_is_told_by_a_file(tmp_path: Path) -> None:
     found, _ = drafted(tmp_path, kicked())
     (said,) = [sentence for sentence in found.seen if "is taken as up" in sentence]
     assert said.startswith("z is taken as up") and '{"gravity": [0, -9.81, 0]} or so into take.json' in said
+
+
+def test_a_pendulum_in_millimeters(tmp_path: Path) -> None:
+    """The draft did not name the unit that it had taken, and did not run."""
+    t = np.arange(1001) / 200
+    angle = 0.6 * np.cos(5.0 * t)
+    end = np.stack([250.0 * np.sin(angle), 0.0 * t, 750.0 - 250.0 * np.cos(angle)], axis=1)
+    x = np.stack([np.broadcast_to([0.0, 0.0, 750.0], end.shape), end], axis=1)
+    recording = sb.Recording(1e-3 * x, t, name="take")
+    text = draft([Take(seen(recording), "take.csv", "mm")], "take").text
+    assert {part["units"] for part in tomllib.loads(text)["recording"]} == {"mm"}
+
+
+def test_markers_with_the_name_of_a_body_are_not_on_the_rope(tmp_path: Path) -> None:
+    """The marker of a hand that is nearest to the rope was its first one: the rope came out 5 % too long."""
+    x = swinging(0.0)
+    hand = x[:, :1] + np.array([[0.04, 0.03, 0.02], [-0.05, 0.01, 0.03], [0.01, -0.04, 0.05], [-0.02, 0.05, 0.06]])
+    names = ["Hand", "Hand:Marker1", "Hand:Marker2", "Hand:Marker3", *(f"Unlabeled {k}" for k in range(1, 11))]
+    x = np.concatenate([hand, x[:, 1:]], axis=1)
+    x = x + np.random.default_rng(7).normal(0.0, NOISE, x.shape)
+    take = Take(seen(sb.Recording(x, np.arange(len(x)) / RATE, names)), "take.csv")
+    content = tomllib.loads(draft([take], "take").text)
+    (rope,) = content["scene"].get("rope", content["scene"].get("rod"))
+    assert "Hand" not in " ".join(rope["markers"])
+    assert set(rope["grip"][0]["markers"]) == set(names[:4])

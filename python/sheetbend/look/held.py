@@ -63,8 +63,10 @@ def parts(s: Seen) -> tuple[tuple[int, ...], tuple[int, ...]]:
         return hand, order
     # the rope's own first marker keeps its place in the hand too
     near = NEAR * float(np.median([s.apart[a, b] for a, b in pairwise(order)]))
-    marked = {name.split(":")[0] for name in s.recording.markers if ":" in name}
-    solid = [k for k in hand if s.recording.markers[k] not in marked]  # the place of a body is no marker on a rope
+    of_body = {name.split(":")[0] for name in (s.recording.markers[k] for k in hand) if ":" in name}
+    of_body -= {s.recording.markers[k].split(":")[0] for k in order}
+    # what carries the name of the body, or is its place, is no marker on the rope
+    solid = [k for k in hand if s.recording.markers[k].split(":")[0] not in of_body]
     pairs = [(at, k) for at in (0, -1) for k in solid if s.apart[order[at], k] <= near]
     if pairs:
         at, own = min(pairs, key=lambda pair: _slack(s, order[pair[0]], pair[1]))

@@ -69,8 +69,8 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         fix = (
             "take the configuration in docs/tutorials/dragged_rope.md, with a table and its friction, for your markers"
         )
-        names = joined(s.recording.markers[k] for k in order)
-        raise RecordingError("markers", "slide along at one height, as a rope on a floor or a table does", names, fix)
+        got = joined(s.recording.markers[k] for k in order)
+        raise RecordingError("markers", "slide along at one height, as a rope on a floor or a table does", got, fix)
     found = _at_rest(s, order) if s.static else held(s, hand, order)
     if len(found.order) < 3:
         return None
