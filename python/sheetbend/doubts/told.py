@@ -40,6 +40,7 @@ GROUPS: Mapping[str, tuple[str, tuple[float, str]]] = {
 }
 """Told numbers that are no quantities, by the name under which a standard deviation is given: unit and step."""
 SIZE, LATER, SLOWER, LARGER = "size of gravity", "frames later", "clock", "size of the recording"
+FARTHER, ASIDE = "path of what drives the scene", "place of what drives the scene"
 _NONE = np.zeros(0)
 
 
@@ -125,9 +126,11 @@ def _collect(
         (1.0, Told(i, "collider_direction", at, "rad", STEPS["rad"], _NONE, missing=_turned(at), signed=True))
         for at in turns
     ]
+    path = _path(e, e.scene.compiled.inputs(theta[slots[i]]))
+    made += [(1.0, Told(i, "", FARTHER, "m", (0.01, "1 %"), _NONE, relative=True)) for _ in path]
     by_gravity: dict[int, Array] = {}
     if made:
-        columns = tangents(problem, u, i, names | size | turns, asked, corrected)
+        columns = tangents(problem, u, i, names | size | turns | path, asked, corrected)
         for (weight, one), column in zip(made, columns.T, strict=True):
             yield replace(one, column=weight * column)
         by_gravity = {axis: columns[:, len(asked) + n] for n, axis in enumerate(toward)}
@@ -155,6 +158,17 @@ def _turns(e: Experiment) -> dict[str, Input]:
         for axis in range(3):
             found[f"{name} about {AXES[axis]}"] = "collider_pose", knots + 3 + axis, np.ones(len(knots))
     return found
+
+
+def _path(e: Experiment, inputs: Array) -> dict[str, Input]:
+    """What lengthens the path of what drives a scene, from where it begins. Where that follows recorded markers, its
+    path is theirs."""
+    if not e.scene.boundary.driven or e.scene.boundary.following:
+        return {}
+    first, size = e.scene.compiled.layout["boundary"]
+    knots = inputs[first : first + size].reshape(len(e.scene.boundary.times), -1)
+    moved = (knots - knots[0]).ravel()
+    return {FARTHER: ("boundary", np.flatnonzero(moved), moved[moved != 0.0])} if moved.any() else {}
 
 
 def _turned(label: str) -> Callable[[float], str]:
@@ -217,10 +231,14 @@ def _observe(
         speed = np.gradient(shown, r.times, axis=0)
         yield change(LATER, "", speed, "s")
         yield change(SLOWER, "", speed * (r.times - e.t0)[:, None, None], relative=True)
+    aside = [(AXES[a], np.broadcast_to(np.eye(3)[a], shown.shape)) for a in range(3) if a in axes]
+    if boundary.driven and not e.scene.contacts.contacts:  # a table would have to move as well
+        for way, moved in aside:
+            yield change(f"{ASIDE} {way}", "", moved, "m")
     if not held or boundary.driven:  # what is driven goes where it was measured
         return
-    for axis in [a for a in range(3) if a in axes]:
-        yield change(f"clamps along {AXES[axis]}", "clamps", np.broadcast_to(np.eye(3)[axis], shown.shape))
+    for way, moved in aside:
+        yield change(f"clamps along {way}", "clamps", moved)
     arm = shown - start[held].mean(axis=0)
     yield change(LARGER, "", arm, relative=True)
     if len(e.scene.air.triangles) or len(e.scene.forces.particles):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
-from .told import DEGREE, LARGER, LATER, MILLIMETER, SIZE, SLOWER, Told
+from .told import ASIDE, DEGREE, FARTHER, LARGER, LATER, MILLIMETER, SIZE, SLOWER, Told
 
 
 def words_of(one: Told, more: float, problem: FitProblem, group: Sequence[int]) -> str:
@@ -28,12 +28,16 @@ def words_of(one: Told, more: float, problem: FitProblem, group: Sequence[int]) 
         return f"the motion{of} had begun {short(1e3 * abs(more), 2)} ms {when} than the scene does (start_time)"
     if one.label == SLOWER:
         return f"the times of the recording{of} were {size} too {'short' if more > 0 else 'long'} (its frame rate)"
+    if one.label == FARTHER:
+        return f"what drives the scene{of} moved {size} {'farther' if more > 0 else 'less far'}"
     if one.label == LARGER:
         return f"the recording{of} were {size} too {'small' if more < 0 else 'large'} (its scale)"
     if one.name == "gravity":
         return f"gravity were turned by {short(abs(more) / DEGREE, 2)} degrees {_way(one.label, more)}"
     if one.name == "clamp_direction":
         return f"the clamps{of} and all with them were turned by {short(abs(more) / DEGREE, 2)} degrees about {axis}"
+    if one.label.startswith(ASIDE):
+        return f"what drives the scene{of} was {short(abs(more) / MILLIMETER, 2)} mm farther along {axis}"
     if one.name == "clamps":
         return f"the clamps{of} and all with them stood {short(abs(more) / MILLIMETER, 2)} mm farther along {axis}"
     if one.name == "markers":

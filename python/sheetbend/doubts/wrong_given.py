@@ -38,12 +38,13 @@ from .lacking import Lacking
 from .losses_at_zero import is_loss
 from .losses_beside_contacts import lost_beside_contacts
 from .other_losses import LEAVES
-from .told import LARGER, LATER, SLOWER, Told, told_numbers
+from .told import ASIDE, FARTHER, LARGER, LATER, SLOWER, Told, told_numbers
 from .told_words import words_of
 
 MUCH = 2.0
 """Times the noise, and the told sigma's where that is more: what a fit that misses much leaves beyond it. Residuals are
 1.7 sigma then, or more."""
+OWN = (LATER, SLOWER, LARGER, FARTHER, ASIDE)  # errors that each recording has of its own
 LONGEST = 5e7  # rows times directions: above, markers are asked only all together
 
 
@@ -202,7 +203,7 @@ def _directions(
     apart = len(within) * rows <= LONGEST
     each: dict[str, tuple[Told, Array]] = {}
     for one in within:
-        own = one.name in ("clamps", "clamp_direction") or one.label in (LATER, SLOWER, LARGER)
+        own = one.name in ("clamps", "clamp_direction") or one.label.startswith(OWN)
         labels = [(f"{one.label} {one.experiment}" if own or one.marker else one.label, one)]
         if one.marker:
             together = f"all {one.experiment} {one.label.rsplit(' ', 1)[-1]}", replace(one, marker="")
