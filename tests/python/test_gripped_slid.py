@@ -11,7 +11,7 @@ import sheetbend as sb
 from sheetbend.gripped import GrippedMotion, RopeModel
 from sheetbend.gripped import slid as slid_before
 from sheetbend.gripped.judging import predict
-from sheetbend.gripped.slid import AT_REST, BEFORE, MODES, noise, slid, window_of
+from sheetbend.gripped.slid import MODES, MORE, STEPS, noise, slid, window_of
 from sheetbend.minimum.problem import FitProblem
 from sheetbend.report.scores import coordinate_error
 from test_gripped_motion import carried_about, model_of, simulated
@@ -140,4 +140,4 @@ def test_each_step_takes_one_derivative(monkeypatch: pytest.MonkeyPatch) -> None
 
     monkeypatch.setattr(FitProblem, "evaluate", counted)
     slid(replace(MODEL, slid_modes=MODES), recorded(HISTORY), 0.0, {})
-    assert 1 <= asked.count(True) <= BEFORE + AT_REST and not asked[-1]
+    assert 1 <= asked.count(True) <= STEPS + MORE and not asked[-1]

@@ -29,8 +29,7 @@ MODES = tuple(range(6))
 DRAG = f"{NAME}_drag_linear"
 LARGEST = 4.0  # standard deviation of mode 0, in yield curvatures: a joint that has slid too far slides back at once
 FIRST = 0.5  # the same, before the frames were seen
-STEPS, ROUNDS = 4, 30  # to what had slid, and to its size in each
-BEFORE, AT_REST = 2, 3  # of the steps where a rope rests: from its first frames, and then from its balance too
+STEPS, MORE, ROUNDS = 4, 4, 30  # to what had slid, and to its size in each
 PARTS = (1.0, 0.4, 0.16, 0.064)  # of a step, the first of which that lowers the cost is taken
 LEAST_NOISE = 1e-4  # m, of a marker
 # The speed at a start comes from the same frames. Its error moves a marker by up to twice the noise there, in all of
@@ -88,11 +87,10 @@ def slid(model: RopeModel, motion: GrippedMotion, first: float, values: Mapping[
     if not moving.compared:
         return nothing
     largest = np.array([yields / (1.0 + 0.5 * k) for k in model.slid_modes for _ in (1, 2)])
-    rest = rests(motion, frames, size)
-    at = _searched(_problem([moving], nothing, values), largest, np.zeros(len(largest)), BEFORE if rest else STEPS)
-    if rest:
+    at = _searched(_problem([moving], nothing, values), largest, np.zeros(len(largest)), STEPS)
+    if rests(motion, frames, size):
         both = [moving, creep(model, motion, frames, size)]
-        at = _searched(_problem(both, nothing, values), largest, at, AT_REST)
+        at = _searched(_problem(both, nothing, values), largest, at, MORE)
     return dict(zip(nothing, (largest * at).tolist(), strict=True))
 
 
