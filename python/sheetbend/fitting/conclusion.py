@@ -18,6 +18,7 @@ from ..doubts.losses import loss_doubts
 from ..doubts.missing_force import missing_force
 from ..doubts.missing_loss import missing_loss
 from ..doubts.prediction import predicted_values
+from ..doubts.pressed import pressed_to_bounds
 from ..doubts.profiles import Elsewhere
 from ..doubts.spin import spins_otherwise
 from ..doubts.stuck import bounded_by_sticking
@@ -145,6 +146,7 @@ def _doubts(
         missing_force(at.problem, at.u, judged),
         spin,
         unstable_rests(*fitted),
+        pressed_to_bounds(at.problem, at.u, judged),
     )
     return warnings, together(*lacking, drawn_off, contradicted)
 

@@ -1,0 +1,81 @@
+"""Parameters that stopped at a bound while the data ask for a value beyond it.
+
+The intervals of all other parameters take such a parameter as known. So these say nothing of where the others would go
+if it were free.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..arrays.timeseries import Array
+from ..minimum.problem import FitProblem
+from ..quantities.wording import short
+from ..result.estimate import Estimate
+from ..statistics.gauge import RANK_TOLERANCE
+from ..statistics.identifiability import Identifiability
+from ..statistics.intervals import at_far_limit, reach_of
+
+ASKED = 6.63
+"""Fall of chi-square without the bound from which on the data ask for a value beyond it: the 1 % level."""
+FAR = 0.5
+"""Half-widths that another parameter would move by: an interval that is off by so much contains the truth in 84 instead
+of 95 of 100 cases."""
+
+
+def pressed_to_bounds(problem: FitProblem, u: Array, judged: Identifiability) -> dict[str, str]:
+    """By parameter, that another one stopped at a bound, and how far this one would move without that bound.
+
+    Both follow from a Gauss-Newton step with the last Jacobian: no simulation is needed.
+
+    Args:
+        problem, u: and the point at which the fit ended.
+        judged: there.
+    """
+    names = problem.parameters.free
+    bounded = [e for e in judged.estimates if e.verdict == "at a bound" and _stopped(problem, e)]
+    others = [e for e in judged.estimates if e.half_width is not None and e not in bounded]
+    if not bounded or not others:
+        return {}
+    _, r, J = problem.evaluate(u)
+    columns = [names.index(e.name) for e in others]
+    held, cost = _step(J[:, columns], r)
+    noise = judged.autocorrelation_time * float(r @ r) / max(len(r) - len(names), 1)
+    far: dict[str, tuple[float, str]] = {}
+    for stopped in bounded:
+        column = names.index(stopped.name)
+        freed, lower = _step(J[:, [*columns, column]], r)
+        if not _beyond(problem, u, column, freed[-1]) or 2.0 * (cost - lower) < ASKED * noise:
+            continue
+        for e, by in zip(others, np.abs(freed[:-1] - held), strict=True):
+            reach = reach_of(problem.parameters[e.name], e)
+            if by > max(FAR, far.get(e.name, (0.0, ""))[0]) * reach and reach > 0.0:
+                far[e.name] = (float(by) / reach, f"{stopped.name} = {short(stopped.value)} {stopped.unit}".rstrip())
+    return {
+        name: f"{bound} is its bound, and the data ask for a value beyond it: without that bound this would move by "
+        f"some {short(by, 2)} half-widths"
+        for name, (by, bound) in far.items()
+    }
+
+
+def _stopped(problem: FitProblem, e: Estimate) -> bool:
+    """Whether a bound stopped it, not the end of what a search looks at, nor a limit of sums."""
+    parameter = problem.parameters[e.name]
+    near = 1e-6 * max(abs(e.value), parameter.scale or 0.0)
+    at_bound = min(e.value - parameter.lower, parameter.upper - e.value) <= near
+    return at_bound and not at_far_limit(parameter, e.value)
+
+
+def _step(J: Array, r: Array) -> tuple[Array, float]:
+    """The Gauss-Newton step, and the cost that it leaves."""
+    size = np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny)
+    step = np.linalg.lstsq(J / size, -r, rcond=RANK_TOLERANCE)[0] / size
+    left = r + J @ step
+    return step, 0.5 * float(left @ left)
+
+
+def _beyond(problem: FitProblem, u: Array, column: int, step: float) -> bool:
+    lower, upper = (bound[column] for bound in problem.parameters.bounds())
+    return math.isfinite(step) and (step < 0.0 if u[column] - lower < upper - u[column] else step > 0.0)
