@@ -30,12 +30,13 @@ def noisy(x: Array, seed: int) -> Array:
     return x + NOISE * np.random.default_rng(seed).standard_normal(x.shape)
 
 
-def rope_in_hand(held: str, seconds: float = 2.5) -> sb.Recording:
+def rope_in_hand(held: str, seconds: float = 2.5, stiffness: float = EI) -> sb.Recording:
     """A rope that hangs from a hand, which moves it.
 
     Args:
         held: "one" marker at the end, about which it turns; "two" in the hand, the second of which is where the rope
             becomes free; "body", three beside the rope.
+        stiffness: EI, N m^2.
     """
     t, turns, place = hand(seconds, turning=held != "one")
     scene = sb.Scene("take")
@@ -47,7 +48,7 @@ def rope_in_hand(held: str, seconds: float = 2.5) -> sb.Recording:
         length=LENGTH,
         segments=SEGMENTS,
         density=DENSITY,
-        EI=EI,
+        EI=stiffness,
         bend_damping=DAMPING,
         drag_linear=DRAG,
         points=points,

@@ -105,9 +105,9 @@ def test_a_hand_is_smoothed_where_an_estimate_gains_little_or_takes_long(
     assert any("the true motion of r0" in u and "It is smoothed" in u for u in said["unknown"])
 
 
-@pytest.mark.parametrize("at", ["start", "end"])
-def test_a_hand_holds_a_rope_above_its_first_marker(tmp_path: Path, at: str) -> None:
-    whole = takes.rope_in_hand("body")
+@pytest.mark.parametrize(("at", "stiffer"), [("start", 1), ("end", 1), ("start", 0.2), ("start", 5), ("start", 20)])
+def test_a_hand_holds_a_rope_above_its_first_marker(tmp_path: Path, at: str, stiffer: float) -> None:
+    whole = takes.rope_in_hand("body", stiffness=stiffer * takes.EI)
     names = [n for n in whole.markers if n != "r0"]  # the first marker that is left hangs 88 mm below the hand
     order = names if at == "start" else names[:3] + names[:2:-1]
     said, text = drafted(tmp_path, whole.select(order))

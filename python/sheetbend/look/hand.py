@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -12,8 +13,8 @@ from .seen import Seen
 
 Array = np.ndarray
 RIDES = 3.0  # times the noise: a marker that moves less in the hand's own axes rides on the hand
-LEAST, MOST = 0.1, 0.9  # of the next marker's motion, seen from the hand: beyond, the first one tells of no lead
-BEYOND_HINGE = 1.3  # times the distance of the point it seems to turn about: a stiff rope is held above that
+LEADS = np.geomspace(0.1, 6.0, 150)  # that are looked for, in distances between the first two markers
+LAYERS = np.geomspace(1e-3, 1.0, 80)  # bent stretches that are looked for, in lengths of the rope
 LEAD_SD = 0.3  # of a lead
 TILT_SD, SHIFT_SD = 0.2, 0.1  # rad; of a lead
 
@@ -34,8 +35,7 @@ class Entry:
 def entry(s: Seen, hand: tuple[int, ...], way: tuple[int, ...]) -> Entry:
     """Where a hand holds a rope whose markers are given from the hand on.
 
-    Seen from the hand, the first two markers swing about one point, near which the rope is held: the nearer one moves
-    by a share b of what the other does, so that point is b/(1 - b) times their distance beyond the nearer one.
+    The lead follows from how the first markers swing as seen from the hand.
     """
     x = s.recording.positions
     resting = x[: max(1, int(np.searchsorted(s.recording.times, s.recording.times[0] + s.rest)))]
@@ -54,16 +54,26 @@ def _mean(x: Array, otherwise: float | None = None) -> Array | None:
 
 
 def _lead(s: Seen, hand: tuple[int, ...], way: tuple[int, ...]) -> float:
+    """m from where a hand holds a rope to its first marker; 0 where that rides on the hand, or tells of no lead.
+
+    Seen from the hand, a rope under the tension T that leaves it at an angle is off by the angle times
+    y - l (1 - exp(-y/l)) at y along it, where l = sqrt(EI/T): first it bends, then it hangs on a straight line that
+    meets the hand's direction l below the hand. Lead and l follow from the motions of the first three markers.
+    """
     x = s.recording.positions
-    frames = np.isfinite(x[:, [*hand, *way[:2]], 0]).all(axis=1)
+    frames = np.isfinite(x[:, [*hand, *way[:3]], 0]).all(axis=1)
     if frames.sum() < 3:
         return 0.0
     turns, centers, _ = rigid_motion(x[frames][:, list(hand)])
-    own = np.einsum("fba,fkb->fka", turns, x[frames][:, list(way[:2])] - centers[:, None])
-    off = (own - own.mean(axis=0)).transpose(1, 0, 2).reshape(2, -1)
+    own = np.einsum("fba,fkb->fka", turns, x[frames][:, list(way[:3])] - centers[:, None])
+    off = (own - own.mean(axis=0)).transpose(1, 0, 2).reshape(3, -1)
     if np.sqrt(np.mean(off[0] ** 2)) < RIDES * s.noise:
         return 0.0
-    along = np.linalg.eigh(off @ off.T)[1][:, -1]  # by total least squares: both are noisy
-    share = float(along[0] / along[1]) if along[1] else np.inf
-    apart = float(s.apart[way[0], way[1]])
-    return BEYOND_HINGE * apart * share / (1.0 - share) if LEAST < share < MOST else 0.0
+    chords = np.array([s.apart[a, b] for a, b in pairwise(way)])
+    along = chords[0] * LEADS[:, None, None] + np.concatenate([[0.0], np.cumsum(chords[:2])])
+    layer = chords.sum() * LAYERS[:, None]
+    shapes = along + layer * np.expm1(-along / layer)
+    shapes /= np.linalg.norm(shapes, axis=2, keepdims=True)
+    told = np.einsum("lti,ij,ltj->lt", shapes, off @ off.T, shapes).max(axis=1)
+    best = int(told.argmax())
+    return float(chords[0] * LEADS[best]) if 0 < best < len(LEADS) - 1 else 0.0
