@@ -48,3 +48,35 @@ def test_a_bound_that_noise_alone_comes_to_draws_nothing_off():
 def test_far_bounds_draw_nothing_off():
     fit = fitted(lower=1e-4, upper=1.0, initial=1e-2)
     assert {e.verdict for e in fit.result.estimates} == {"identified"}
+
+
+def test_a_limit_of_the_scene_says_what_to_change():
+    """No configuration can widen it: the links of a lead stretch by no more."""
+    times = np.arange(26) / 50
+
+    def hanging(lead: float) -> sb.Scene:
+        """The first marker, as given, is 0.1 m below the hand's place."""
+        down, segments = np.tile([0, 0, -1.0], (26, 1)), round((0.5 + lead) / 0.05)
+        place = np.stack([0.05 * np.sin(5 * times), 0 * times, 0.03 * np.sin(3 * times) - 0.1 + lead], axis=1)
+        hand = sb.Grip(times, place, down, np.tile([1.0, 0, 0], (26, 1)))
+        scene, points = sb.Scene("hanging"), np.array([place[0], [0, 0, -0.6]])
+        sb.add_rope(scene, segments=segments, points=points, density=0.05, EI=1e-3, grip_start=hand, start_lead=lead)
+        return scene
+
+    true = sb.simulate(hanging(0.1), times, SOLVER, {"rope_start_lead": 0.05})
+    guess = hanging(0.05)
+    experiment = sb.Experiment(
+        scene=guess,
+        recording=sb.Recording(positions=true.positions[:, [4, 8, 12]], times=times, name="swing"),
+        markers=[sb.on_particle(i) for i in (3, 7, 11)],
+        solver=SOLVER,
+        sigma=1e-4,
+    )
+    fit = sb.fit(experiment, parameters=["rope_start_lead"], refine=False, profiles=False)
+    words = fit["rope_start_lead"].words
+    assert fit["rope_start_lead"].verdict == "at a bound"
+    assert (
+        "give the grip another `lead`" in words
+        and "a lead of 0.05 m changes by no more" in words
+        and "widen" not in words
+    )

@@ -11,7 +11,7 @@ from ..arrays.timeseries import Array
 from ..minimum.growth import Growth
 from ..minimum.linear_step import gauss_newton
 from ..minimum.optimizers import Minimum
-from ..minimum.problem import FitProblem
+from ..minimum.problem import FitProblem, quantities_of
 from ..quantities.parameters import Parameters
 from ..quantities.wording import short
 from ..result.estimate import UNSOUND, Estimate
@@ -86,6 +86,7 @@ def judged_parameters(
         nuisance=Nuisance(J[behind:], sum(map(problem.core.absorbed, range(len(problem.experiments))))),
         errors=driven_errors(problem, u, FEW),
         limits=impossible_ahead(problem, u, r, J),
+        fixes=_beyond_scenes(problem),
     )
     return judged, () if profiles is None else tuple(profiles.lower)
 
@@ -95,6 +96,19 @@ def impossible_ahead(problem: FitProblem, u: Array, r: Array, J: Array) -> dict[
     in the parameters themselves goes beyond it. At a minimum inside there is no such step."""
     coordinates = problem.coordinates
     return coordinates.beyond(gauss_newton(problem.parameters, u, J, r)) if coordinates.charts else {}
+
+
+def _beyond_scenes(problem: FitProblem) -> dict[tuple[str, str], str]:
+    """By parameter and side ("lower", "upper") whose bound is the scene's own limit: what to change where it stops."""
+    known = quantities_of(problem.experiments)
+    found: dict[tuple[str, str], str] = {}
+    for name in problem.parameters.free:
+        parameter, q = problem.parameters[name], known.get(name.partition("[")[0])  # of a private one: name[recording]
+        if q is not None and q.limits is not None:
+            bounds = {"lower": parameter.lower, "upper": parameter.upper}
+            own = dict(zip(bounds, q.limits, strict=True))
+            found |= {(name, side): q.beyond for side, bound in bounds.items() if bound == own[side]}
+    return found
 
 
 def _beside(

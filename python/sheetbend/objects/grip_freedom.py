@@ -82,7 +82,10 @@ class Lead:
         self.scene, self.grip, self.nodes = scene, grip, nodes
         given = self.count * link
         limits = (-SHORTEST * given, LONGEST * given)
-        self.quantity = scene.add_quantity(f"{end}_lead", 0.0, "m", positive=False, scale=0.5 * link, limits=limits)
+        beyond = f"a lead of {given:.3g} m changes by no more: give the grip another `lead`, and fit again"
+        self.quantity = scene.add_quantity(
+            f"{end}_lead", 0.0, "m", positive=False, scale=0.5 * link, limits=limits, beyond=beyond
+        )
 
     def hold(self, ghost: int, along: float) -> None:
         """Move the held node and its ghost, and let the links between start where they then are.

@@ -34,6 +34,7 @@ class Quantity:
         positive: whether only positive values make sense (such are fitted on a log scale by default).
         scale: a natural size in `unit` where zero is a sensible value (angles, offsets), else None.
         limits: least and largest value that make sense, where that is not just positive.
+        beyond: what to change where a fit stops at one of them, in words.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Quantity:
     positive: bool = True
     scale: float | None = None
     limits: tuple[float, float] | None = None
+    beyond: str = "no value beyond makes sense: doubt the model"
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.value):
@@ -96,6 +98,7 @@ class Builder(Protocol):
         scale: float | None = None,
         limits: tuple[float, float] | None = None,
         shared: bool = False,
+        beyond: str = Quantity.beyond,
     ) -> str: ...
 
     def add_terms(self, terms: Sequence[Term]) -> None: ...

@@ -73,6 +73,7 @@ class SceneData:
         scale: float | None = None,
         limits: tuple[float, float] | None = None,
         shared: bool = False,
+        beyond: str = Quantity.beyond,
     ) -> str:
         """Declare a named quantity; `add_terms` says what it makes.
 
@@ -83,7 +84,7 @@ class SceneData:
             SceneError: the name is taken, or the value is not finite (or not positive where it must be).
         """
         self._building()
-        quantity = Quantity(name, float(value), unit, positive, scale, limits)
+        quantity = Quantity(name, float(value), unit, positive, scale, limits, beyond)
         before = self.quantities.setdefault(name, quantity)
         if before is quantity or (shared and before == quantity):
             return name

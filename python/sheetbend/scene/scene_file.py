@@ -89,6 +89,7 @@ def _header(scene: Scene) -> dict[str, Any]:
                 "positive": bool(q.positive),
                 "scale": None if q.scale is None else float(q.scale),
                 "limits": None if q.limits is None else [_finite_or_none(limit) for limit in q.limits],
+                "beyond": q.beyond,
             }
             for q in scene.quantities.values()
         ],

@@ -175,10 +175,12 @@ class SceneReader:
                     -np.inf if low[""] is None else self._number(low, "", where + "limits"),
                     np.inf if high[""] is None else self._number(high, "", where + "limits"),
                 )
+            beyond = self.part(about, "beyond", str, where) if "beyond" in about else Quantity.beyond
             if name in found:
                 self.fail(where + "name", "is there twice", name, DAMAGED)
             try:
-                found[name] = Quantity(name, value, unit, self.part(about, "positive", bool, where), scale, limits)
+                positive = self.part(about, "positive", bool, where)
+                found[name] = Quantity(name, value, unit, positive, scale, limits, beyond)
             except SceneError as error:
                 self.fail(where + "value", error.problem, error.got, DAMAGED)
         return found

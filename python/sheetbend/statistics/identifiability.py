@@ -60,6 +60,7 @@ def identify(
     nuisance: Nuisance | None = None,
     errors: Array | None = None,
     limits: Mapping[str, str] | None = None,
+    fixes: Mapping[tuple[str, str], str] | None = None,
     rank_tolerance: float = RANK_TOLERANCE,
 ) -> Identifiability:
     """Judge every free parameter of a finished fit.
@@ -79,6 +80,8 @@ def identify(
         errors: (rows, draws) random draws of errors of the residuals that are alike in all of the data, such as noise
             of what drives a scene makes.
         limits: where parameters stopped because a body beyond is impossible, in words, by parameter.
+        fixes: what to change where a parameter stops at a bound that is no user's, by parameter and side ("lower",
+            "upper").
         rank_tolerance: see `gauge.RANK_TOLERANCE`.
 
     Raises:
@@ -89,7 +92,8 @@ def identify(
     _check(parameters, internal, residuals, jacobian, {*floors, *discretization, *systematic})
     nuisance = nuisance or Nuisance(np.zeros((0, len(parameters.free))), 0.0)
     errors = np.zeros((len(residuals), 0)) if errors is None else errors
-    judge = Judge(parameters, internal, residuals, jacobian, layout, rank_tolerance, nuisance, errors, limits or {})
+    limits, fixes = limits or {}, fixes or {}
+    judge = Judge(parameters, internal, residuals, jacobian, layout, rank_tolerance, nuisance, errors, limits, fixes)
     linear = [
         judge.linear(column, (discretization.get(name, 0.0), systematic.get(name, 0.0)))
         for column, name in enumerate(parameters.free)

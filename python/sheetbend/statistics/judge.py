@@ -104,8 +104,9 @@ class Judge:
         nuisance: Nuisance,
         errors: Array,
         limits: Mapping[str, str],
+        fixes: Mapping[tuple[str, str], str],
     ) -> None:
-        self.parameters, self.internal, self.limits = parameters, internal, limits
+        self.parameters, self.internal, self.limits, self.fixes = parameters, internal, limits, fixes
         self.quantile = require("scipy.special", "fit").stdtrit
         names, log = parameters.free, [parameters[name].log for name in parameters.free]
         data = np.vstack([jacobian, nuisance.jacobian])
@@ -280,7 +281,8 @@ class Judge:
         if not (self.at_lower[column] or self.at_upper[column]):
             return None
         side, bound = ("lower", parameter.lower) if self.at_lower[column] else ("upper", parameter.upper)
-        return f"stopped at its {side} bound {quantity(bound, parameter)}: widen it, or doubt the model"
+        fix = self.fixes.get((parameter.name, side), "widen it, or doubt the model")
+        return f"stopped at its {side} bound {quantity(bound, parameter)}: {fix}"
 
 
 def _with_answers(found: Ends, linear: Ends) -> tuple[Ends, str]:
