@@ -8,7 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays.smoothing import smoothed
+from ..arrays.timeseries import default_max_gap, interpolate
 from .seen import RIGID, Seen
+from .swing import Moments, Swing, moments
 from .take import Description, Measured, Take
 from .text import table
 
@@ -19,6 +22,8 @@ ARMS = {1: ["arm"], 2: ["upper", "lower"], 3: ["upper", "middle", "lower"]}
 KINDS = {1: "a pendulum", 2: "a double pendulum", 3: "a triple pendulum"}
 FITTED, PREDICTED = 4, 4  # pieces
 LEAD = 0.1  # s, at the beginning of a predicted piece, that its start is fitted to
+SMOOTH = 0.1  # s, that angles are smoothed over
+LEAST_VISCOSITY = 1e-4  # N m s/rad, that a fit begins with, where the first arm weighs 1 kg
 SUBSTEP = 1 / 1600  # s, at most
 LEAST_FRAMES = 20
 """Of a recording that tells what moves."""
@@ -43,8 +48,10 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         "masses: the motion shows only their ratios. One of them is set to 1 kg (or 1 kg m^2), and the others are "
         "relative to it"
     ]
-    pivot = np.nanmean(x[:, joints[0]], axis=0).tolist()
+    # The plane is y = 0: elsewhere rounding moves the arms out of it, and the fold of their triangles grows.
+    pivot = (np.nanmean(x[:, joints[0]], axis=0) * (1.0, 0.0, 1.0)).tolist()
     lines = [] if r.gravity is not None else table("[scene]", {"gravity": s.gravity.tolist()})
+    swing, pieces = _swing(x, r.times, joints), _pieces(s, takes[0], len(arms))
     step = float(np.median(np.diff(r.times)))
     lines += table("[solver]", {"substeps": max(1, int(np.ceil(step / SUBSTEP - 1e-9)))})
     if len(arms) == 1:
@@ -63,23 +70,23 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
             "arm_drag": {},
         }
     else:
-        for k, (arm, radius) in enumerate(zip(arms[:-1], radii, strict=False)):
-            lines += table("[[scene.arm]]", _arm(arm, radius, arms[k - 1] if k else pivot))
-        lines += table("[[scene.arm]]", _arm("lower", 2.2 * radii[-1], arms[-2], 1.5 * radii[-1]))
+        unknown.append("how the arms that hang share a mass at their hinges: it moves like a part of either one")
+        shown_by = [_between(swing, piece["fit"]) for piece, _ in pieces if "held_out" not in piece]
+        lines += _arms(arms, pivot, radii, moments(shown_by, np.array(radii), float(np.abs(s.gravity).max())))
         parameters = {f"{arm}_{key}": dict[str, Any]() for arm in arms for key in ("first_moment", "inertia")}
         del parameters["upper_inertia"]  # the scale of all masses
-        parameters |= {f"{arm}_friction": {} for arm in arms} | {"lower_drag": {}}
+        parameters |= {f"{arm}_{loss}": {} for loss in ("friction", "hinge_viscosity") for arm in arms}
+        parameters["lower_drag"] = {}
     for arm in arms:
         lines += table(f"[scene.quantities.{arm}_zero]", {"scale": 1e-3}, {"scale": "m, of the marker's offset across"})
         parameters[f"{arm}_zero"] = {}
     for arm, name, radius in zip(arms, names[1:], radii, strict=True):
         lines += table("[[marker]]", {"marker": name, "arm": arm, "radius": radius})
-    angles, rates = _states(x, r.times, joints)
     sigma = max(s.noise, 1e-4)
-    for entries, start in _pieces(s, takes[0], len(arms)):
+    for entries, start in pieces:
         frame = int(np.searchsorted(r.times, start))
-        values = {f"{arm}_angle": float(angles[k, frame]) for k, arm in enumerate(arms)}
-        values |= {f"{arm}_rate": float(rates[k, frame]) for k, arm in enumerate(arms)}
+        values = {f"{arm}_angle": float(swing.angles[k, frame]) for k, arm in enumerate(arms)}
+        values |= {f"{arm}_rate": float(swing.rates[k, frame]) for k, arm in enumerate(arms)}
         offsets = {name: ["", "", f"{arm}_zero"] for arm, name in zip(arms, names[1:], strict=True)}
         shown = {"radius": radii[0]} if len(arms) == 1 else {}
         lines += table(
@@ -124,27 +131,41 @@ def _distance(x: Array, a: int, b: int) -> Array:
     return np.asarray(np.linalg.norm(x[:, a] - x[:, b], axis=1))
 
 
-def _arm(name: str, length: float, pivot: list[float] | str, inertia_length: float | None = None) -> dict[str, Any]:
-    """A uniform one of 1 kg."""
-    size = inertia_length or length
-    own = {
-        "name": name,
-        "mass": 1.0,
-        "first_moment": size / 2,
-        "inertia": size**2 / 3,
-        "length": length,
-        "pivot": pivot,
-    }
-    return own | {"friction": 1e-3} | ({"drag": 1e-4} if name == "lower" else {})
+def _arms(names: list[str], pivot: list[float], radii: list[float], found: Moments) -> list[str]:
+    """Tables of the arms. Nothing hangs on the last one's end: any length that gives its particles a mass will do."""
+    lines: list[str] = []
+    for k, name in enumerate(names):
+        last = k == len(names) - 1
+        entries = {
+            "name": name,
+            "mass": found.mass[k],
+            "first_moment": found.first[k],
+            "inertia": found.inertia[k],
+            "length": max(2.2 * radii[k], 1.5 * found.inertia[k] / found.first[k]) if last else radii[k],
+            "pivot": names[k - 1] if k else pivot,
+            "friction": 1e-3,
+            "viscosity": max(found.viscosity[k], LEAST_VISCOSITY),
+        }
+        lines += table("[[scene.arm]]", entries | ({"drag": 1e-4} if last else {}))
+    return lines
 
 
-def _states(x: Array, times: Array, joints: list[int]) -> tuple[Array, Array]:
-    """Angles rad from straight down towards +x, and their rates rad/s, (arms, frames)."""
+def _swing(x: Array, times: Array, joints: list[int]) -> Swing:
+    """Angles rad from straight down towards +x, and their rates rad/s, smoothed over a moment. Lines bridge gaps."""
+    near = interpolate(times, x[:, joints], times, "linear", default_max_gap(times))
+    known = np.asarray(np.isfinite(near).all(axis=(1, 2)))
     d = x[:, joints[1:]] - x[:, joints[:-1]]
-    angles = np.unwrap(np.arctan2(d[:, :, 0], -d[:, :, 2]), axis=0)
-    rates = np.gradient(angles, times, axis=0)
+    told = np.arctan2(d[:, :, 0], -d[:, :, 2]).T
+    pairs = zip(told, np.isfinite(told), strict=True)
+    angles = np.stack([np.interp(times, times[ok], np.unwrap(angle[ok])) for angle, ok in pairs], axis=1)
+    angles, rates = smoothed(times, angles, SMOOTH)
     turns = 2.0 * np.pi * np.round(angles / (2.0 * np.pi))
-    return (angles - turns).T, rates.T
+    return Swing(times, (angles - turns).T, rates.T, known)
+
+
+def _between(swing: Swing, part: list[float]) -> Swing:
+    inside = (swing.times >= part[0]) & (swing.times <= part[1])
+    return Swing(swing.times[inside], swing.angles[:, inside], swing.rates[:, inside], swing.seen[inside])
 
 
 def _pieces(s: Seen, take: Take, arms: int) -> list[tuple[dict[str, Any], float]]:
