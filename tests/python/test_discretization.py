@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 import sheetbend as sb
 from pytest import approx
 from sheetbend.mesh import grid
-from sheetbend.minimum import time_step
-from sheetbend.minimum.linear_step import gauss_newton
-from sheetbend.minimum.optimizers import minimize
+from sheetbend.minimum import discretization, time_step
+from sheetbend.minimum.linear_step import gauss_newton, moves
+from sheetbend.minimum.optimizers import Minimum, minimize, refit
 from sheetbend.minimum.problem import FitProblem, as_parameters
 from sheetbend.minimum.time_step import settle
 from sheetbend.quantities.parameters import Parameter, Parameters
@@ -192,6 +193,27 @@ def test_a_sheet_on_a_mesh_three_times_too_coarse_is_not_identified():
     found = sb.fit(of(6), parameters=list(truth), profiles=False, refine=finer)
     for name, value in truth.items():
         assert found[name].verdict in ("weak", "doubtful") and off(found[name], value) < 1
+
+
+def test_a_refit_on_a_finer_mesh_begins_near_its_end(monkeypatch: pytest.MonkeyPatch):
+    """It ends where one from the fit's minimum does, in fewer iterations."""
+    coarse, fine = (replace(rope(links, 3e-3), recording=of_sixty_links()) for links in (20, 40))
+    wanted = ["rope_EI", "rope_bend_damping", "rope_drag_linear"]
+    problem = FitProblem([coarse], as_parameters(wanted, [coarse]))
+    u = minimize(problem, problem.parameters.initial())[0].u
+    plain = minimize(FitProblem([fine], problem.given), u)[0]
+    ends: list[Minimum] = []
+
+    def noted(*given: Any, **options: Any) -> Minimum:
+        ends.append(refit(*given, **options))
+        return ends[-1]
+
+    monkeypatch.setattr(discretization, "refit", noted)
+    finer = sb.Refinement(finer=lambda: [fine])
+    (made,), _, _ = discretization.refined_estimates(finer, [coarse], problem, u, u, "auto")
+    (end,) = ends
+    assert end.iterations < plain.iterations and end.first < 0.3 * plain.first
+    assert made.moved == approx(moves(problem.parameters, u, plain.u), rel=1e-6)
 
 
 def test_a_refinement_that_has_no_answer_is_named_and_does_not_end_the_fit():

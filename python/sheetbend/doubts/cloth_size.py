@@ -35,7 +35,7 @@ def cloth_sizes(problem: FitProblem, u: Array, i: int) -> list[Told]:
     e = problem.experiments[i]
     theta, slots, _ = problem.known(u)
     values = dict(zip(e.scene.quantities, theta[slots[i]].tolist(), strict=True))
-    added: dict[str, Input] = {}
+    added: dict[str, list[Input]] = {}
     free = {problem.parameters.roots[name][0] for name in problem.parameters.free}
     directions: list[tuple[str, Callable[[float], str], list[str]]] = []
     for name, cloth in e.scene.cloths.items():
@@ -44,8 +44,11 @@ def cloth_sizes(problem: FitProblem, u: Array, i: int) -> list[Told]:
             if f"{name}_{along}_size" in free:
                 continue
             label = f"size of {name} along the {along}"
-            of = {f"{label}: {array}": one for array, one in _larger(e.scene, cloth, values, axis).items()}
-            start = {f"{label}: position": one for one in _longer_start(e.scene, cloth, axis)}
+            each = {
+                label: _larger(e.scene, cloth, values, axis),
+                f"{label}: start": list(_longer_start(e.scene, cloth, axis)),
+            }
+            of, start = ({key: inputs} if inputs else {} for key, inputs in each.items())
             added |= of | start
             directions += _told(name, label, f" along the {along}", [*of], [*start])
             made, starts = [*made, *of], [*starts, *start]
@@ -72,8 +75,8 @@ def _told(
         yield f"{label}, start", _says(name, along, "and its start and the places of its pins with it"), made + starts
 
 
-def _larger(scene: Scene, cloth: Cloth, values: Mapping[str, float], axis: int) -> dict[str, Input]:
-    """By input array, what a larger size along an axis of the material adds to it, relative."""
+def _larger(scene: Scene, cloth: Cloth, values: Mapping[str, float], axis: int) -> list[Input]:
+    """What a larger size along an axis of the material adds to input arrays, relative."""
     held = {*scene.pinned, *scene.boundary.driven}
     for still in ((), tuple(np.flatnonzero([int(p) in held for p in cloth.particles]).tolist())):
         try:
@@ -83,8 +86,8 @@ def _larger(scene: Scene, cloth: Cloth, values: Mapping[str, float], axis: int) 
         groups = ends[0].groups
         known = {g.name: g.particles for g in scene.groups}
         if all(np.array_equal(known.get(g.name, ()), cloth.particles[g.particles]) for g in groups):
-            return dict(_differences(scene, cloth, ends, values))
-    return {}
+            return list(_differences(scene, cloth, ends, values))
+    return []
 
 
 def _alone(cloth: Cloth, size: float, axis: int, still: tuple[int, ...]) -> Scene:
@@ -97,9 +100,7 @@ def _alone(cloth: Cloth, size: float, axis: int, still: tuple[int, ...]) -> Scen
     return scene
 
 
-def _differences(
-    scene: Scene, cloth: Cloth, ends: list[Scene], values: Mapping[str, float]
-) -> Iterator[tuple[str, Input]]:
+def _differences(scene: Scene, cloth: Cloth, ends: list[Scene], values: Mapping[str, float]) -> Iterator[Input]:
     layout = ends[0].compiled.layout
     at: Array = np.array([values[name] for name in ends[0].quantities])
     low, high = (end.compiled.inputs(at) for end in ends)
@@ -111,7 +112,7 @@ def _differences(
         if not by.any():
             continue
         if array in PARTICLES:
-            yield array, (array, cloth.particles.astype(int), by)
+            yield array, cloth.particles.astype(int), by
             continue
         entries = np.zeros(size, dtype=int)
         for g in ends[0].groups:
@@ -119,7 +120,7 @@ def _differences(
             place = int(array == "rest")
             mine, own = firsts[g.name][place], others[g.name][place]
             entries[own : own + count] = mine + np.arange(count)
-        yield array, (array, entries, by)
+        yield array, entries, by
 
 
 def _firsts(scene: Scene) -> dict[str, tuple[int, int]]:

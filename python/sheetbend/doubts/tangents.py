@@ -23,7 +23,7 @@ def tangents(
     problem: FitProblem,
     u: Array,
     i: int,
-    added: Mapping[str, Array | Input],
+    added: Mapping[str, Array | Input | list[Input]],
     quantities: Sequence[tuple[str, int, bool]] = (),
     corrected: Array | None = None,
 ) -> Array:
@@ -31,7 +31,7 @@ def tangents(
 
     Args:
         u: (free,) the point.
-        added: by name, what one unit of it adds: to gravity (3,) m/s^2, or to another input array.
+        added: by name, what one unit of it adds: to gravity (3,) m/s^2, or to another input array, or to several.
         quantities: name, place among the scene's quantities, and whether the derivative is that with respect to the
             logarithm.
         corrected: the experiment's corrections there (`FitProblem.corrections`).
@@ -49,9 +49,9 @@ def tangents(
     ]
     at = [float(np.log(own[slot]) if log else own[slot]) for _, slot, log in quantities] + [0.0] * len(names)
     d = e.core(problem.recordings[i], corrected)
-    inputs: list[Input] = [v if isinstance(v, tuple) else ("gravity", np.arange(3), v) for v in added.values()]
-    made = zip(names, inputs, strict=True)
-    terms = [Term(array, where, by, ((name, "identity"),)) for name, (array, where, by) in made]
+    terms = [
+        Term(array, where, by, ((name, "identity"),)) for name, v in added.items() for array, where, by in _inputs(v)
+    ]
     terms = [*e.extra_terms(), *e.sensor_terms(), *terms]
     map_ = e.scene.compiled.map(3 * len(e.compared) + 1, terms, [*e.scene.quantities, *names])
     d["map"] = map_ | {"base": d["map"]["base"]}
@@ -66,3 +66,9 @@ def tangents(
     if not ok:
         raise SheetbendError(core.failure)
     return np.asarray(columns)
+
+
+def _inputs(added: Array | Input | list[Input]) -> list[Input]:
+    if isinstance(added, list):
+        return added
+    return [added if isinstance(added, tuple) else ("gravity", np.arange(3), added)]

@@ -22,7 +22,7 @@ from ..quantities.parameters import Parameters
 from ..result.result import Refit
 from ..statistics.profile import FARTHEST
 from .fine_meshes import left_open, two_steps
-from .linear_step import moves, one_step
+from .linear_step import gauss_newton, moves, one_step, residuals_there
 from .optimizers import Minimum, refit
 from .problem import FitProblem
 from .refuted import refuted, words
@@ -125,7 +125,6 @@ def refined_estimates(
     made: list[Refit] = []
     failed: list[str] = []
     warnings: list[str] = []
-    here = problem.parameters.to_physical(u)
     for name, refined, to_limit in _refits(refinement, experiments):
         try:
             finer = FitProblem(refined(), problem.given, threads=problem.threads)
@@ -135,7 +134,7 @@ def refined_estimates(
             elif refinement.linear:
                 end, rest = two_steps(problem, finer, u)
             else:
-                end = refit(finer, finer.parameters.to_internal(here), optimizer).u
+                end = _refitted(problem, finer, u, optimizer)
         except SheetbendError as error:
             failed.append(f"{name} not counted: {error}")
             continue
@@ -148,6 +147,16 @@ def refined_estimates(
                 left = left_open(problem.parameters, at, to_limit * (end - u), to_limit * rest)
         made.append(Refit(name=name, to_limit=to_limit, moved=moves(problem.parameters, at, at + end - u), left=left))
     return tuple(made), tuple(failed), tuple(warnings)
+
+
+def _refitted(problem: FitProblem, finer: FitProblem, u: np.ndarray, optimizer: str) -> np.ndarray:
+    """The minimum of a finer problem. The search starts where `one_step` leads from the minimum u of the fit, if the
+    cost is lower there: that is near the end, and takes no Jacobian of the finer problem."""
+    there = residuals_there(problem, finer, u)
+    _, r, J = problem.evaluate(u)
+    step = gauss_newton(problem.parameters, u, J, there - r)
+    start, first = min(((u, 0.5 * float(there @ there)), (step, finer.cost(step))), key=lambda each: each[1])
+    return refit(finer, start, optimizer, first=first).u
 
 
 def to_the_limit(refits: Iterable[Refit], parameters: Parameters, values: Mapping[str, float]) -> dict[str, float]:

@@ -175,14 +175,19 @@ def promised(problem: FitProblem, u: np.ndarray) -> float:
 
 
 def refit(
-    problem: FitProblem, u: np.ndarray, optimizer: str, max_iterations: int = 200, tolerance: float = 1e-10
+    problem: FitProblem,
+    u: np.ndarray,
+    optimizer: str,
+    max_iterations: int = 200,
+    tolerance: float = 1e-10,
+    first: float | None = None,
 ) -> Minimum:
     """`minimize` for a step of larger work (a profile, a refinement), which Ctrl-C ends as a whole.
 
     Raises:
         KeyboardInterrupt: an interrupted end is worth nothing to the caller.
     """
-    end, _ = minimize(problem, u, optimizer, max_iterations, tolerance)
+    end, _ = minimize(problem, u, optimizer, max_iterations, tolerance, first=first)
     if end.interrupted:
         raise KeyboardInterrupt
     return end
