@@ -195,7 +195,8 @@ def _of_hand(s: Seen, hand: tuple[int, ...], found: Held) -> str:
         found.notes.append(f"{all_of} move as one rigid body, which holds the rope some {where.lead:.2g} m from {name}")
         found.unknown.append(
             f"where the rope leaves the hand, and in which direction: as the next markers swing, {where.lead:.2g} "
-            f"m from {name}. Both are fitted. Measure that length, and give it as `lead` with a narrower prior"
+            f"m from {name}. Both are fitted: the whole rope is rope_length + rope_{at}_lead long. Measure the length "
+            "from the hand to that marker, and give it as `lead` with a narrower prior"
         )
         found.lead, grip["lead"] = where.lead, where.lead
         found.rope |= {"tilts": True, "shifts": True}
