@@ -88,6 +88,9 @@ template <int N>
 Lanes<N> sqrt(const Lanes<N>& a) {
   using Vector = typename Lanes<N>::Vector;
   return Lanes<N>::map(a, a, [](const Vector& x, const Vector&) {
+#if __has_builtin(__builtin_elementwise_sqrt)  // clang, whose newer versions lack those of gcc
+    return Vector(__builtin_elementwise_sqrt(x));
+#else
 #if defined(__AVX512F__)
     if constexpr (sizeof(Vector) == 64)
       return Vector(__builtin_ia32_sqrtpd512_mask(x, x, 255, 4));  // 4: as rounded now
@@ -101,6 +104,7 @@ Lanes<N> sqrt(const Lanes<N>& a) {
     Vector r;
     for (int i = 0; i < Lanes<N>::width; ++i) r[i] = __builtin_sqrt(x[i]);
     return r;
+#endif
   });
 }
 template <int N>
