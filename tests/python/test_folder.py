@@ -38,6 +38,15 @@ def test_the_pattern_and_the_units_are_used(tmp_path: Path) -> None:
     assert np.array_equal(sb.read_recordings(tmp_path, "a*", units="mm")[0].positions, X * 1e-3)
 
 
+def test_a_table_that_ends_in_txt_is_read_where_the_pattern_says_so(tmp_path: Path) -> None:
+    dataset(tmp_path, "swing.csv")
+    (tmp_path / "swing.csv").rename(tmp_path / "swing.txt")
+    (tmp_path / "swing.json").unlink()
+    assert [r.name for r in sb.read_recordings(tmp_path, "*.txt")] == ["swing"]
+    with pytest.raises(sb.RecordingError, match="holds no recording"):
+        sb.read_recordings(tmp_path)
+
+
 def test_recordings_without_a_name_take_that_of_their_file(tmp_path: Path) -> None:
     for name in ("swing.npz", "fall.csv"):
         sb.Recording(X, T).save(tmp_path / name)

@@ -9,6 +9,9 @@ from ..recording import Recording
 from . import FORMATS
 from .natural import by_number
 
+NOTES = ".txt"
+"""Files of this suffix are tables or notes: in a folder they count as recordings only where the pattern names it."""
+
 
 def read_recordings(
     folder: str | Path,
@@ -23,7 +26,8 @@ def read_recordings(
 
     Args:
         folder: where the files lie. Files that no reader knows, such as the JSON beside a recording, are left out.
-        pattern: which files, as for `Path.glob`; "*/*" looks one folder below.
+        pattern: which files, as for `Path.glob`; "*/*" looks one folder below. Files that end in .txt are read only
+            where the pattern does, too.
         units: length unit of the files, as for `Recording.load`.
         refused: where given, gets the errors of files that cannot be read, by file name, and the others are read.
 
@@ -37,10 +41,11 @@ def read_recordings(
     root = Path(folder)
     if not root.is_dir():
         raise RecordingError("folder", "is no folder", str(folder), "give the folder that holds the files")
-    files = sorted((p for p in root.glob(pattern) if p.is_file() and p.suffix.lower() in FORMATS), key=by_number)
+    known = [suffix for suffix in FORMATS if suffix != NOTES or pattern.lower().endswith(NOTES)]
+    files = sorted((p for p in root.glob(pattern) if p.is_file() and p.suffix.lower() in known), key=by_number)
     if not files:
         inside = sorted(p.name + "/" * p.is_dir() for p in root.iterdir())
-        fix = f"give the folder of the files and a pattern that they match; files end in {' or '.join(FORMATS)}"
+        fix = f"give the folder of the files and a pattern that they match; files end in {' or '.join(known)}"
         raise RecordingError(f"{folder}", f"holds no recording that matches {pattern!r}", inside, fix)
     first: dict[str, Path] = {}
     found = []
