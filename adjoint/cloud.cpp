@@ -12,7 +12,7 @@
 namespace sheetbend {
 namespace {
 
-constexpr double rounding = 1e-9;  // of distances that are compared
+constexpr double same_distance = 1e-9;  // of distances that are compared
 
 void gather_corners(const ClothSurface& s, const double* x, std::size_t triangle, double* to) {
   for (const int vertex : s.corners[triangle]) to = std::copy_n(x + 3 * static_cast<std::size_t>(vertex), 3, to);
@@ -70,7 +70,7 @@ std::vector<ClosestPart> closest_parts(const ClothSurface& s, const double* x, c
     const double* point = points + 3 * i;
     if (std::isnan(point[0])) continue;
     // No triangle farther away than that can be the closest.
-    const double reach = (1.0 + rounding) * distance_of_closest_vertex(s, x, point);
+    const double reach = (1.0 + same_distance) * distance_of_closest_vertex(s, x, point);
     seen.push_back(static_cast<int>(i));
     around.push_back({{point[0] - reach, point[1] - reach, point[2] - reach},
                       {point[0] + reach, point[1] + reach, point[2] + reach}});
@@ -96,7 +96,7 @@ std::vector<ClosestPart> closest_parts(const ClothSurface& s, const double* x, c
     const Part part = part_of_triangle(at);
     const double distance = std::sqrt(nearest_on_triangle(at, part).squared), plane = std::abs(plane_distance(at));
     // Triangles share the edge or the corner that is closest; the one whose plane is farthest tells on which side the point is.
-    const double equal = rounding * least[i];
+    const double equal = same_distance * least[i];
     if (distance > least[i] + equal || (distance >= least[i] - equal && plane <= off[i])) continue;
     least[i] = std::min(least[i], distance);
     off[i] = plane;
