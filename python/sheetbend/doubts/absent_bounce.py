@@ -12,8 +12,9 @@ from dataclasses import replace
 
 from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
-from ..quantities.parameters import Parameter, Parameters
+from ..quantities.parameters import Parameter
 from ..quantities.quantities import Quantity, Term
+from .more_parameters import with_parameter
 
 RESTITUTION = Parameter(name="restitution", initial=0.5, lower=0.0, upper=1.0, scale=0.1)
 SIZES = tuple(k / 10 for k in range(1, 10))
@@ -32,10 +33,7 @@ def with_bounce(problem: FitProblem, restitution: float) -> FitProblem:
 
 def with_free_bounce(problem: FitProblem) -> FitProblem:
     """The same, with the restitution as one more parameter, the last one."""
-    more = problem.of([_bouncing(e, 0.5) if has_no_bounce(e) else e for e in problem.experiments])
-    given = Parameters([*problem.given.values(), RESTITUTION])
-    every = Parameters([*problem.parameters.values(), RESTITUTION])
-    return FitProblem(more.experiments, given, problem.recordings, problem.threads, every)
+    return with_parameter(with_bounce(problem, 0.5), RESTITUTION)
 
 
 def _bouncing(e: Experiment, restitution: float) -> Experiment:

@@ -13,9 +13,10 @@ import numpy as np
 from ..arrays.timeseries import Array
 from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
-from ..quantities.parameters import Parameter, Parameters
+from ..quantities.parameters import Parameter
 from ..quantities.quantities import Quantity, Term
 from ..scene.scene import Scene
+from .more_parameters import with_parameter
 
 DAMPING = Parameter(name="damping", initial=1.0, log=True)  # in intervals between frames
 FRAMES = (1 / 3, 1.0, 3.0)  # intervals between frames: the time constants that are tried
@@ -47,10 +48,7 @@ def with_damping(problem: FitProblem, u: Array, frames: float, only: str = "") -
 
 def with_free_damping(problem: FitProblem, u: Array, only: str) -> FitProblem:
     """The same, with the frame intervals as one more parameter, the last one."""
-    more = with_damping(problem, u, 1.0, only)
-    given = Parameters([*problem.given.values(), DAMPING])
-    every = Parameters([*problem.parameters.values(), DAMPING])
-    return FitProblem(more.experiments, given, problem.recordings, problem.threads, every)
+    return with_parameter(with_damping(problem, u, 1.0, only), DAMPING)
 
 
 def _damped(e: Experiment, theta: Array, interval: float, frames: float, only: str) -> Experiment:

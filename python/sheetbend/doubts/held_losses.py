@@ -21,6 +21,7 @@ from ..quantities.parameters import Parameter, Parameters
 from ..quantities.wording import short
 from .directions import Asked, clearly, rows_of, tied
 from .losses import LOSSES
+from .more_parameters import with_parameter
 
 HELD: dict[str, Any] = {"fixed": True, "log": False, "prior": None, "lower": -math.inf, "upper": math.inf}
 
@@ -68,13 +69,7 @@ def of_size(problem: FitProblem, name: str, times: float) -> FitProblem:
         for e in problem.experiments
         if name in e.scene.quantities
     ]
-    return FitProblem(
-        problem.experiments,
-        Parameters([*problem.given.values(), Parameter(name=name, private=True)]),
-        problem.recordings,
-        problem.threads,
-        Parameters([*problem.parameters.values(), *sized]),
-    )
+    return with_parameter(problem, Parameter(name=name, private=True), sized)
 
 
 def _columns(problem: FitProblem, u: Array, names: Sequence[str]) -> dict[str, Array]:
