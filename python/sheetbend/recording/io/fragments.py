@@ -29,13 +29,8 @@ def joined(
     """
     x = positions.copy()
     kept = {k: [k] for k in range(len(names))}
-    spans = {k: _span(x[:, k]) for k in kept}
-    links = sorted(
-        (found, a, b)
-        for b in kept
-        for a in kept
-        if unnamed[a] and unnamed[b] and (found := _apart(times, x, spans, a, b)) is not None
-    )
+    spans = {k: _span(x[:, k]) for k in kept if unnamed[k]}
+    links = sorted((found, a, b) for b in spans for a in spans if (found := _apart(times, x, spans, a, b)) is not None)
     after: dict[int, int] = {}
     for _, a, b in links:
         if a not in after and b not in after.values():
