@@ -10,7 +10,8 @@ import contact_cases as contact
 import numpy as np
 import sheetbend as sb
 from sheetbend import textile
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.experiment.wanted import as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.result.estimate import Estimate
 
 SIGMA = 3e-3  # m

@@ -18,9 +18,10 @@ import numpy as np
 import sheetbend as sb
 from sheetbend.config import load
 from sheetbend.doubts.prediction import compare, predicted_values
+from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.approach import Approach
 from sheetbend.minimum.continuity import joined, shot_motions
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.quantities.parameters import Parameters
 from sheetbend.result.shot import ShotMotion
 

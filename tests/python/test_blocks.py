@@ -8,9 +8,10 @@ import pytest
 import sheetbend as sb
 from pytest import approx
 from sheetbend.doubts.contradictions import splits
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.experiment.wanted import as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.statistics.blocks import Split, contradiction
-from sheetbend.statistics.covariance import Layout
+from sheetbend.statistics.layout import Layout
 from test_identifiability import design, errors
 
 FRAMES, CHANNELS = 100, 4

@@ -9,7 +9,8 @@ import pytest
 import sheetbend as sb
 from sheetbend.doubts.cloth_size import cloth_sizes
 from sheetbend.errors import SceneError
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.experiment.wanted import as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.objects.flat_size import POWERS, of_edges
 
 NUMBERS: dict[str, Any] = {"density": 0.15, "warp": 150.0, "weft": 200.0, "shear": 40.0, "poisson": 0.2}

@@ -5,7 +5,7 @@ import pytest
 import sheetbend as sb
 from pytest import approx
 from sheetbend.doubts.floors import solver_floors
-from sheetbend.minimum.problem import as_parameters
+from sheetbend.experiment.wanted import as_parameters
 
 G, SIZE, DENSITY, SWEEPS = 9.81, 0.3, 0.2, 10
 

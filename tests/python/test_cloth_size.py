@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.doubts.cloth_size import cloth_sizes
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.experiment.wanted import as_parameters
+from sheetbend.minimum.problem import FitProblem
 from test_wrong_given import asked
 
 TIMES = np.arange(61) / 100

@@ -10,7 +10,8 @@ import sheetbend as sb
 from pytest import approx
 from scipy.integrate import quad
 from scipy.optimize import brentq
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.experiment.wanted import as_parameters
+from sheetbend.minimum.problem import FitProblem
 from support import static_sensitivity, twice
 
 WARP, SHEAR = 1000.0, 50.0

@@ -265,7 +265,8 @@ class TestBuild:
         second = '\n[[recording]]\nfile = "swing.npz"\nname = "again"\nvalues = { rope_EI = 5e-3 }\n'
         text = ROPE.replace("[parameters.rope_EI]", f"{second}\n[parameters.rope_EI]\nprivate = true")
         study = load(written(folder, text))
-        from sheetbend.minimum.problem import FitProblem, as_parameters
+        from sheetbend.experiment.wanted import as_parameters
+        from sheetbend.minimum.problem import FitProblem
 
         problem = FitProblem(study.experiments, as_parameters(study.parameters, study.experiments))
         values = problem.parameters.to_physical(problem.parameters.initial())

@@ -7,7 +7,10 @@ import pytest
 from pytest import approx
 from sheetbend.errors import InputError
 from sheetbend.statistics.colored import Colored
-from sheetbend.statistics.covariance import Layout, Sandwich, _columns, _expected_lags, _Grid, _lagged, covariance
+from sheetbend.statistics.covariance import Sandwich, covariance
+from sheetbend.statistics.layout import Layout
+from sheetbend.statistics.row_grid import RowGrid, _columns
+from sheetbend.statistics.spectral import _expected_lags, _lagged
 
 
 def uneven() -> tuple[Layout, np.random.Generator]:
@@ -32,7 +35,7 @@ def test_columns_are_told_apart_as_numpy_does_and_no_two_rows_share_a_place() ->
 def test_the_covariance_of_rows_and_of_what_a_fit_leaves_of_them() -> None:
     layout, rng = uneven()
     rows, p, lags = len(layout.frame), 3, 6
-    grid = _Grid(layout, rng.standard_normal(rows))
+    grid = RowGrid(layout, rng.standard_normal(rows))
     Q = np.linalg.qr(rng.standard_normal((rows, p)))[0]
     mixing = grid.channel_covariance(grid.kinds)
     spectra = [1.0 / np.abs(1 - a * np.exp(-2j * np.pi * np.fft.rfftfreq(grid.length))) ** 2 for a in (0.8, -0.3)]

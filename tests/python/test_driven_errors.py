@@ -10,7 +10,8 @@ import sheetbend as sb
 from pytest import approx
 from sheetbend.doubts import driven_errors as module
 from sheetbend.doubts.driven_errors import _KNOWN, driven_errors
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.experiment.wanted import as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.statistics.blocks import contradiction
 from sheetbend.statistics.shared_errors import moved_by
 from test_blocks import LAYOUT, SPLITS, fitted, jacobian

@@ -16,10 +16,11 @@ from sheetbend.config import Study, build, parse
 from sheetbend.doubts.driven_errors import FEW, DrivenErrors, drawn_noise, driven_errors
 from sheetbend.doubts.driven_noise import driven_doubts, driven_noises
 from sheetbend.experiment.driven_motion import estimated_motion
+from sheetbend.experiment.wanted import as_parameters
 from sheetbend.fitting.fitted_motion import fitted_positions
 from sheetbend.minimum.linear_step import residuals_there
 from sheetbend.minimum.optimizers import Progress, minimize
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.time_step import halved
 from sheetbend.statistics.identifiability import identify
 from typer.testing import CliRunner

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.config import build, parse
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.experiment.wanted import as_parameters
+from sheetbend.minimum.problem import FitProblem
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "held_cloth"
 sys.path.insert(0, str(FOLDER))

@@ -14,7 +14,8 @@ import pytest
 import sheetbend as sb
 from sheetbend.config import build, parse
 from sheetbend.config.build import Study
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.experiment.wanted import as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.statistics.gauge import null_space
 
 pytestmark = pytest.mark.slow

@@ -14,7 +14,8 @@ import sheetbend as sb
 from sheetbend.config import build, parse
 from sheetbend.config.build import Study
 from sheetbend.config.values import with_values
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.experiment.wanted import as_parameters
+from sheetbend.minimum.problem import FitProblem
 
 pytestmark = pytest.mark.slow
 

@@ -9,10 +9,12 @@ import sheetbend as sb
 from pytest import approx
 from sheetbend.cli.app import app
 from sheetbend.config import load
+from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.jacobian_check import check_jacobian
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.pictures.force_plot import plot_forces
-from sheetbend.statistics.covariance import Layout, covariance
+from sheetbend.statistics.covariance import covariance
+from sheetbend.statistics.layout import Layout
 from typer.testing import CliRunner
 
 TRUTH = {"rod_density": 0.12, "rod_EI": 6e-3}

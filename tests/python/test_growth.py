@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import sheetbend as sb
+from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.growth import ROUGH, Growth, growth, growths
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.objects.arm import add_arm
 
 

@@ -11,7 +11,8 @@ import sheetbend as sb
 import tomli_w
 from sheetbend.config import build, parse
 from sheetbend.doubts.spin import spins_otherwise
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.experiment.wanted import as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.statistics.identifiability import Identifiability
 
 Array = np.ndarray

@@ -11,11 +11,12 @@ from pytest import approx
 from scipy import signal, special
 from sheetbend.errors import InputError
 from sheetbend.quantities.parameters import Parameter, Parameters
-from sheetbend.statistics.covariance import Layout, covariance
+from sheetbend.statistics.covariance import covariance
 from sheetbend.statistics.gauge import null_space
 from sheetbend.statistics.identifiability import identify
 from sheetbend.statistics.intervals import widened
 from sheetbend.statistics.judge import Floor
+from sheetbend.statistics.layout import Layout
 from sheetbend.statistics.profile import Profile, Profiler, Wanted, profile_interval
 
 SEEDS = 400

@@ -11,7 +11,8 @@ import pytest
 import sheetbend as sb
 from pytest import approx
 from scipy.integrate import solve_ivp
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.experiment.wanted import as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.quantities.quantities import term
 from sheetbend.report.report import plain
 from support import observed_orders

@@ -17,10 +17,11 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend import _core
+from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum import content, journal
 from sheetbend.minimum.journal import Journal
 from sheetbend.minimum.optimizers import Progress, has_ceres, minimize
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.minimum.problem import FitProblem
 
 WANTED = ("rope_EI", "rope_bend_damping")
 OPTIMIZERS = ["scipy", *(["ceres"] if has_ceres() else [])]

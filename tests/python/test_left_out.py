@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from pytest import approx
 from sheetbend.statistics.blocks import Split, contradiction
-from sheetbend.statistics.covariance import Layout, covariance
+from sheetbend.statistics.covariance import covariance
+from sheetbend.statistics.layout import Layout
 from sheetbend.statistics.left_out import left_out
 from test_blocks import fitted
 from test_identifiability import errors

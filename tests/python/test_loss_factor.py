@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.doubts.floors import solver_floors
-from sheetbend.minimum.problem import as_parameters
+from sheetbend.experiment.wanted import as_parameters
 
 LENGTH, DENSITY, EI = 0.1, 1.0, 0.02
 FIRST = 3.51601526 / (2 * np.pi * LENGTH**2) * np.sqrt(EI / DENSITY)  # Hz, of a cantilever

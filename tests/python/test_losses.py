@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.doubts.losses import air_doubts, loss_sum
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.experiment.wanted import as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.result.estimate import Estimate
 
 TRUE = {"strip_bend_damping": 4e-3, "strip_drag_linear": 0.16}

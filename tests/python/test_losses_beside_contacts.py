@@ -15,9 +15,10 @@ from sheetbend.doubts.missing_parts import missing_parts
 from sheetbend.doubts.other_losses import other_losses
 from sheetbend.doubts.told import told_numbers
 from sheetbend.doubts.wrong_given import wrong_given
+from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.discretization import AUTO
 from sheetbend.minimum.optimizers import minimize
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.time_step import settle
 from test_contact_fit import SIGMA, SOLVER, TIMES
 

@@ -15,9 +15,10 @@ import pytest
 import sheetbend as sb
 from pytest import approx
 from sheetbend.errors import InputError
+from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.approach import inside
 from sheetbend.minimum.blocks import ManyProblem
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.report.many import ManyFit
 from test_workers import Backwards
 

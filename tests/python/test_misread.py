@@ -11,7 +11,8 @@ import sheetbend as sb
 from sheetbend.doubts.contradictions import doubtful
 from sheetbend.doubts.implausible import implausible
 from sheetbend.doubts.misread import _better, misread
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.experiment.wanted import as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.statistics.intervals import open_estimate
 
 SOLVER, SIGMA = sb.Solver(h=1 / 400), 3e-4

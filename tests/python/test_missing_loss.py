@@ -11,8 +11,9 @@ from sheetbend.doubts.directions import EXPLAINS, LEVEL, asked_for
 from sheetbend.doubts.held_losses import held_losses
 from sheetbend.doubts.missing_loss import of_more_loss
 from sheetbend.doubts.other_losses import other_losses
+from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.optimizers import minimize
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.minimum.problem import FitProblem
 from test_unexplained import between_hands
 
 SIGMA = 3e-4

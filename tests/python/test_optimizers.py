@@ -12,10 +12,11 @@ import sheetbend as sb
 import sheetbend.minimum.search as search
 from pytest import approx
 from sheetbend.doubts import profiles
+from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum import discretization, optimizers
 from sheetbend.minimum.discretization import Refinement
 from sheetbend.minimum.optimizers import Progress, has_ceres, minimize
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.minimum.problem import FitProblem
 
 fitting = importlib.import_module("sheetbend.fitting.fit")  # the name in the package is the function
 

@@ -12,8 +12,9 @@ import sheetbend as sb
 from pytest import approx
 from scipy.optimize import brentq, least_squares
 from sheetbend.doubts.profiles import Profiles
+from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.optimizers import minimize, named
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.profile_path import Linear, ProfilePath
 from sheetbend.objects.markers import on_particle
 from sheetbend.statistics.profile import Wanted, profile_interval

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.doubts.contradictions import MOST_RECORDINGS, splits
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.experiment.wanted import as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.statistics.blocks import Contradiction, Split, contradiction
-from sheetbend.statistics.covariance import Layout, covariance
+from sheetbend.statistics.covariance import covariance
+from sheetbend.statistics.layout import Layout
 from sheetbend.statistics.left_out import left_out
 from test_blocks import fitted
 from test_identifiability import errors

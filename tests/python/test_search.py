@@ -12,11 +12,12 @@ import pytest
 import sheetbend as sb
 from pytest import approx
 from sheetbend.errors import InputError, SheetbendError
+from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.approach import Approach, inside
 from sheetbend.minimum.coordinates import LOG_STEP, step_limits
 from sheetbend.minimum.growth import Growth
 from sheetbend.minimum.optimizers import has_ceres, minimize
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.search import Search
 from sheetbend.minimum.windows import chosen, cut
 from sheetbend.quantities.parameters import DEFAULT_RANGE, Parameter, Parameters

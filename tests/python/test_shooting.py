@@ -12,12 +12,13 @@ from sheetbend.config import load
 from sheetbend.doubts.missing_loss import missing_loss
 from sheetbend.doubts.other_losses import other_losses
 from sheetbend.experiment.cut import borders
+from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.continuity import joined, with_window
 from sheetbend.minimum.journal import Journal
 from sheetbend.minimum.lifted import Lifted
 from sheetbend.minimum.lifted_window import LiftedWindow, Seen
 from sheetbend.minimum.optimizers import walked
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.statistics.chain import Chain, Gap, Window
 
 RATE, NOISE = 50.0, 2e-4

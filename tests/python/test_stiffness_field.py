@@ -11,7 +11,8 @@ import sheetbend as sb
 import tomli_w
 from sheetbend.config import load
 from sheetbend.config.values import with_values, write
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.experiment.wanted import as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.smooth import with_fields
 from sheetbend.objects.stiffness_field import StiffnessField, modes_of
 

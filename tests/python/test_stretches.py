@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from pytest import approx
-from sheetbend.statistics.covariance import Layout, covariance
+from sheetbend.statistics.covariance import covariance
+from sheetbend.statistics.layout import Layout
 from sheetbend.statistics.stretches import scatter, within_sigma
 
 FRAMES, FIRST = 600, 67

@@ -14,8 +14,9 @@ from sheetbend.doubts.conclude import judged_parameters, without_verdict
 from sheetbend.doubts.contradictions import elsewhere, held_out_motion
 from sheetbend.doubts.profiles import Elsewhere
 from sheetbend.doubts.stationary import no_minimum
+from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.optimizers import Minimum
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.objects.arm import add_arm
 from sheetbend.result.estimate import UNSOUND
 from sheetbend.statistics.identifiability import Identifiability

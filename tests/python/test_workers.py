@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.errors import InputError
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.experiment.wanted import as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.workers import Common, working_on
 from test_journal import TIMED, swinging
 

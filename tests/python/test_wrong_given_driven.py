@@ -11,7 +11,8 @@ from pytest import approx
 from sheetbend.doubts.driven_errors import MOST_NUMBERS, driven_errors, driven_span
 from sheetbend.doubts.told import FARTHER, told_numbers
 from sheetbend.doubts.wrong_given import wrong_given
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.experiment.wanted import as_parameters
+from sheetbend.minimum.problem import FitProblem
 from test_contact_fit import SOLVER, TIMES, dragged
 from test_driven_errors import NOISE, START, swung
 from test_misread import SIGMA

@@ -12,6 +12,7 @@ from rich.console import Console
 
 from ..config import GrippedConfig, Study, load, parse_any, scene_alone
 from ..experiment.experiment import Experiment
+from ..experiment.wanted import as_parameters
 from ..gripped.model import RopeModel, nominal_directions
 from ..gripped.over_density import UNIT
 from ..gripped.plausible import gravities
@@ -19,7 +20,7 @@ from ..gripped.start import started, whole
 from ..gripped.windows import SPANS
 from ..minimum.growth import in_words, over_fit
 from ..minimum.jacobian_check import JacobianReport, check_jacobian
-from ..minimum.problem import FitProblem, as_parameters
+from ..minimum.problem import FitProblem
 from ..motion.gradients import GradientReport, check_gradients
 from ..motion.solver import Solver
 from ..objects.chain import unit_vector

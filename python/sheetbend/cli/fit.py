@@ -15,13 +15,14 @@ from ..config import Config, GrippedConfig, Study, build, parse_any
 from ..config.driven_motion import driven_files, save_driven, with_driven
 from ..config.values import with_values, write
 from ..errors import ConfigError
+from ..experiment.wanted import as_parameters
 from ..files.door import reading
 from ..files.whole import write_text
 from ..fitting.fit import Fit
 from ..fitting.fit import fit as run_fit
 from ..minimum.cluster import workers as workers_of
 from ..minimum.journal import Journal
-from ..minimum.problem import FitProblem, as_parameters
+from ..minimum.problem import FitProblem
 from ..minimum.workers import working_on
 from ..pictures.movie import movie_paths
 from ..recording.recording import Recording

@@ -9,8 +9,8 @@ from typing import Any
 
 from ..errors import ConfigError
 from ..experiment.experiment import Experiment
+from ..experiment.wanted import as_parameters
 from ..minimum.discretization import Refinement
-from ..minimum.problem import as_parameters
 from ..minimum.smooth import Smooth, with_fields
 from ..motion.solver import Solver
 from ..recording.windows import check_windows

@@ -35,11 +35,12 @@ from ..minimum.windows import chosen, cut
 from ..optional import require
 from ..quantities.wording import short
 from ..statistics.blocks import FEWEST, LEVEL, short_of_frames
-from ..statistics.covariance import Covariance, autocorrelation, covariance
+from ..statistics.covariance import Covariance, covariance
 from ..statistics.gauge import null_space
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of
 from ..statistics.shared_errors import moved_by
+from ..statistics.spectral import autocorrelation
 from ..statistics.stretches import scatter, within_sigma
 from .contradictions import CLAIMS, drawn_along, finer_experiments, value_words
 from .driven_errors import driven_errors

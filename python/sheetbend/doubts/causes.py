@@ -10,8 +10,8 @@ import numpy as np
 
 from ..arrays.timeseries import Array
 from ..optional import require
-from ..statistics.covariance import Layout
 from ..statistics.gauge import RANK_TOLERANCE
+from ..statistics.layout import Layout
 from .directions import LEVEL
 from .told import Told
 from .two_directions import chance_of, two_directions

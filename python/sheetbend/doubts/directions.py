@@ -16,8 +16,9 @@ from ..arrays.timeseries import Array
 from ..minimum.problem import FitProblem
 from ..optional import require
 from ..statistics.blocks import short_of_frames
-from ..statistics.covariance import Layout, covariance
+from ..statistics.covariance import covariance
 from ..statistics.gauge import RANK_TOLERANCE
+from ..statistics.layout import Layout
 from ..statistics.white_noise import white_noise
 from .driven_errors import FEW, driven_errors
 

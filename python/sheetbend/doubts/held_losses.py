@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from ..arrays.timeseries import Array
-from ..minimum.problem import FitProblem, quantities_of
+from ..experiment.wanted import quantities_of
+from ..minimum.problem import FitProblem
 from ..quantities.parameters import Parameter, Parameters
 from ..quantities.wording import short
 from .directions import Asked, clearly, rows_of, tied

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from ..minimum.problem import FitProblem, quantities_of
+from ..experiment.wanted import quantities_of
+from ..minimum.problem import FitProblem
 from ..quantities.wording import short
 from ..scene.scene import Scene
 

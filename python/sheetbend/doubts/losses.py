@@ -19,6 +19,7 @@ from ..quantities.wording import short
 from ..result.estimate import Estimate
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import NORMAL
+from ..statistics.least_squares import unexplained
 
 Array = np.ndarray
 LOSSES = ("_damping", "_viscosity", "_drag_linear", "_drag_quadratic", "_air_normal", "_air_tangential", "_loss_factor")
@@ -96,8 +97,7 @@ def loss_sum(problem: FitProblem, u: Array, names: Sequence[str], autocorrelatio
     others = np.vstack([J[:rows][:, rest], prior[~prior[:, own].any(axis=1)][:, rest]])
     here = np.vstack([J[:rows][:, own], np.zeros((len(others) - rows, len(own)))])
     if rest:
-        size = np.maximum(np.linalg.norm(others, axis=0), np.finfo(float).tiny)
-        here = here - others @ (np.linalg.lstsq(others / size, here, rcond=None)[0] / size[:, None])
+        here = unexplained(others, here, rcond=None)
     together = here.sum(axis=1)  # what residuals do when all of them grow by one share
     seen = float(together @ together)
     if seen == 0.0:

@@ -20,7 +20,7 @@ import numpy as np
 from ..arrays.timeseries import Array
 from ..minimum.discretization import Refinement
 from ..minimum.problem import FitProblem
-from ..statistics.gauge import RANK_TOLERANCE
+from ..statistics.least_squares import solved, unexplained
 from .causes import ALIKE, BY_CHANCE, MOST, MOST_NAMED, Wrong
 from .contradictions import residual_shifts
 from .directions import Score, noise_in, rows_of, score
@@ -71,13 +71,10 @@ def lost_beside_contacts(
     gain, mine = alike[0][2].gain if alone is None else alone.gain, rows_of(problem, group)
     noise, count = noise_in(r[:data], layout, mine[:data]), float(np.count_nonzero(mine))
     left = max(float(r[mine] @ r[mine]) - noise, gain)
-    size = np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny)
     return Wrong(
         motions=tuple(group),
         words=tuple(words_of(one, asked.more, problem, group) for one, _, asked in alike),
-        steps=tuple(
-            -asked.more * np.linalg.lstsq(J / size, by, rcond=RANK_TOLERANCE)[0] / size for _, by, asked in alike
-        ),
+        steps=tuple(-asked.more * solved(J, by) for _, by, asked in alike),
         explained=gain / left,
         times=left / max(noise, count),
         sure=left - gain < max((1.0 - MOST) * left, DEVIATIONS * math.sqrt(2.0 * count)),
@@ -96,6 +93,5 @@ def _errors_beside(problem: FitProblem, u: Array, known: Array) -> Array | None:
     errors = driven_errors(problem, u, FEW)
     if not errors.size or not known.size:
         return errors if errors.size else None
-    size = np.maximum(np.linalg.norm(known, axis=0), np.finfo(float).tiny)
-    rest = errors - known / size @ np.linalg.lstsq(known / size, errors, rcond=RANK_TOLERANCE)[0]
+    rest = unexplained(known, errors)
     return rest if np.linalg.norm(rest) > FELT * np.linalg.norm(errors) else None

@@ -28,7 +28,7 @@ from ..experiment.experiment import Experiment
 from ..minimum.optimizers import refit
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
-from ..statistics.gauge import RANK_TOLERANCE
+from ..statistics.least_squares import solved
 from .absent_bounce import SIZES as BOUNCES
 from .absent_bounce import has_no_bounce, with_bounce, with_free_bounce
 from .absent_damping import FRAMES, undamped, with_damping, with_free_damping
@@ -195,8 +195,7 @@ def _reached(more: FitProblem, u: Array, J: Array | None, groups: list[_Group]) 
 def limited_step(problem: FitProblem, u: Array, r: Array, J: Array) -> Array:
     """Where a Gauss-Newton step of limited length from u ends. A number on a logarithmic scale that grows takes the
     step of its own unit: one that ran off to nothing comes back at once."""
-    size = np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny)
-    step = np.maximum(-np.linalg.lstsq(J / size, r, rcond=RANK_TOLERANCE)[0] / size, -STEP)
+    step = np.maximum(-solved(J, r), -STEP)
     log = np.array([problem.parameters[name].log for name in problem.parameters.free])
     step = np.where(log & (step > 0.0), np.log1p(np.abs(step)), np.minimum(step, STEP))
     return np.asarray(np.clip(u + step, *problem.parameters.bounds()))

@@ -14,9 +14,9 @@ from ..arrays.timeseries import Array
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
 from ..result.estimate import Estimate
-from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import at_far_limit, reach_of
+from ..statistics.least_squares import solved
 
 ASKED = 6.63
 """Fall of chi-square without the bound from which on the data ask for a value beyond it: the 1 % level."""
@@ -70,8 +70,7 @@ def _stopped(problem: FitProblem, e: Estimate) -> bool:
 
 def _step(J: Array, r: Array) -> tuple[Array, float]:
     """The Gauss-Newton step, and the cost that it leaves."""
-    size = np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny)
-    step = np.linalg.lstsq(J / size, -r, rcond=RANK_TOLERANCE)[0] / size
+    step = -solved(J, r)
     left = r + J @ step
     return step, 0.5 * float(left @ left)
 

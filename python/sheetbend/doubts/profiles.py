@@ -18,7 +18,7 @@ from ..minimum.optimizers import refit
 from ..minimum.problem import FitProblem
 from ..minimum.profile_path import Linear, ProfilePath
 from ..minimum.workers import Common, current
-from ..statistics.gauge import RANK_TOLERANCE
+from ..statistics.least_squares import solved
 from ..statistics.profile import NOISELESS, Ends, Profile, Wanted, profile_interval
 
 PROFILE_TOLERANCE = 0.02
@@ -178,9 +178,7 @@ class Profiles:
         else:
             _, _, J = part.evaluate(part.parameters.to_internal(self._values))
             column = part.parameters.free.index(name)
-            rest = np.delete(J, column, axis=1)
-            size = np.maximum(np.linalg.norm(rest, axis=0), np.finfo(float).tiny)
-            slope = -np.linalg.lstsq(rest / size, J[:, column], rcond=RANK_TOLERANCE)[0] / size
+            slope = -solved(np.delete(J, column, axis=1), J[:, column])
         ahead = np.clip(known[near] + (at - near) * slope, *held.parameters.limits())
         return min(((u, held.cost(u)) for u in (ahead, known[near])), key=lambda pair: pair[1])
 

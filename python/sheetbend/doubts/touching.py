@@ -20,7 +20,7 @@ from ..motion.depth import too_deep
 from ..motion.simulate import Trajectory, simulate
 from ..result.estimate import Estimate
 from ..result.motions import ContactFit, Kinks
-from ..statistics.gauge import RANK_TOLERANCE
+from ..statistics.least_squares import solved
 
 
 def what_touches(problem: FitProblem, u: Array) -> tuple[ContactFit, ...]:
@@ -122,9 +122,7 @@ def _refitted(problem: FitProblem, u: Array, J: Array, name: str, value: float) 
     body that is possible where moments of inertia are among them."""
     column = problem.parameters.free.index(name)
     by = problem.parameters[name].to_internal(value) - u[column]
-    size = np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny)
-    others = np.delete(J / size, column, axis=1)
-    follow = np.linalg.lstsq(others, -J[:, column] * by, rcond=RANK_TOLERANCE)[0]
-    moved = u + np.insert(follow / np.delete(size, column), column, by)
+    follow = -solved(np.delete(J, column, axis=1), J[:, column] * by)
+    moved = u + np.insert(follow, column, by)
     inside = np.asarray(np.clip(moved, *problem.parameters.limits()))
     return problem.coordinates.out(problem.coordinates.into(inside))

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays.timeseries import Array
-from ..statistics.covariance import Layout
+from ..statistics.layout import Layout
+from ..statistics.least_squares import unexplained
 from .directions import asked_for
 
 STILL_LEFT = 1 / 3  # of what one direction leaves unexplained, at most, for a second one to count
@@ -72,8 +73,7 @@ def chance_of(r: Array, J: Array, columns: Sequence[Array], mine: Array, layout:
         after, beside = r, J
         for other in [*columns[:k], *columns[k + 1 :]]:
             beside = np.column_stack([beside, other])
-            size = np.maximum(np.linalg.norm(beside, axis=0), np.finfo(float).tiny)
-            after = r - beside / size @ np.linalg.lstsq(beside / size, r, rcond=None)[0]
+            after = unexplained(beside, r, rcond=None)
         asked = asked_for(after, beside, column, mine, layout, errors=errors)
         chances.append(1.0 if asked is None else asked.chance)
     return max(chances)

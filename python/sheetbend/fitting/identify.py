@@ -21,20 +21,21 @@ from ..doubts.floors import solver_floors
 from ..doubts.roughness import rough_parameters
 from ..errors import InputError, SheetbendError
 from ..experiment.experiment import Experiment
+from ..experiment.wanted import ParameterLike, as_parameters
 from ..minimum.growth import growths, in_words
 from ..minimum.linear_algebra import one_blas_thread
-from ..minimum.problem import FitProblem, ParameterLike, as_parameters
+from ..minimum.problem import FitProblem
 from ..minimum.smooth import Smooth, with_fields
 from ..optional import require
 from ..quantities.parameters import Parameters
 from ..recording.recording import Recording
 from ..result.estimate import Estimate
 from ..scene.scene import Scene
-from ..statistics.covariance import Layout
 from ..statistics.identifiability import Identifiability
 from ..statistics.identifiability import identify as judged
 from ..statistics.intervals import open_estimate
 from ..statistics.judge import Nuisance
+from ..statistics.layout import Layout
 from .experiments import experiments_of
 from .plan import Plan, Variant
 from .variants import changes

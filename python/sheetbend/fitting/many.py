@@ -12,11 +12,11 @@ import numpy as np
 from ..arrays.timeseries import Array
 from ..errors import InputError, SheetbendError
 from ..experiment.experiment import Experiment
+from ..experiment.wanted import ParameterLike, as_parameters
 from ..minimum.blocks import Arrow, ManyApproach, ManyProblem, reduced
 from ..minimum.counts import counted
 from ..minimum.linear_algebra import one_blas_thread
 from ..minimum.optimizers import Progress
-from ..minimum.problem import ParameterLike, as_parameters
 from ..minimum.workers import shared_out
 from ..optional import require
 from ..quantities.parameters import Parameter, Parameters

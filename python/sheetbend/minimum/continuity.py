@@ -24,7 +24,7 @@ from ..optional import require
 from ..quantities.parameters import Parameters
 from ..result.shot import ShotMotion
 from ..statistics.chain import Chain
-from ..statistics.covariance import autocorrelation
+from ..statistics.spectral import autocorrelation
 from .growth import over_fit
 from .lifted import Lifted
 from .lifted_motion import Motion

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import InputError, SheetbendError
 from ..quantities.parameters import Parameters
-from ..statistics.gauge import RANK_TOLERANCE
+from ..statistics.least_squares import solved
 from ..statistics.profile import FARTHEST
 from .problem import FitProblem
 
@@ -48,10 +48,8 @@ def gauss_newton(parameters: Parameters, u: np.ndarray, J: np.ndarray, change: n
     log = np.array([parameters[name].log for name in parameters.free], dtype=bool)
     free = (u > lower) & (u < upper)
     while True:
-        columns = J[:, free]
-        size = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
         step = np.zeros(len(u))
-        step[free] = np.linalg.lstsq(columns / size, -change, rcond=RANK_TOLERANCE)[0] / size
+        step[free] = -solved(J[:, free], change)
         far = log & (np.abs(step) > FARTHEST)
         if not far.any():
             return np.clip(u + step, lower, upper)

@@ -1,22 +1,21 @@
-"""From experiments and parameters to the compiled least-squares problem."""
+"""The compiled least-squares problem of experiments and parameters."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from .. import _core
-from ..errors import InputError, choices, refusal
+from ..errors import InputError, refusal
 from ..experiment.experiment import Experiment
 from ..motion.equilibrium import no_rest
 from ..motion.simulate import divergence
-from ..quantities.parameters import Parameter, Parameters
-from ..quantities.quantities import Quantity
+from ..quantities.parameters import Parameters
 from ..recording.recording import Recording
-from ..statistics.covariance import Layout
+from ..statistics.layout import Layout
 from . import content
 from .coordinates import Coordinates, sums_of
 from .counts import count
@@ -25,62 +24,8 @@ from .lifted import Known, lifted
 from .parts import expanded_to, reaching
 from .spread import Spread
 
-ParameterLike = Parameter | Mapping[str, Any] | None
 NOTHING = np.zeros((0, 1, 3))  # no correction at any knot
 CHEAP = 3.0  # times the residuals: a Jacobian that costs less is made with them
-
-
-def quantities_of(experiments: Sequence[Experiment]) -> dict[str, Quantity]:
-    """Every named quantity of the experiments' scenes, the first scene's value first."""
-    found: dict[str, Quantity] = {}
-    for e in experiments:
-        for name, quantity in e.scene.quantities.items():
-            found.setdefault(name, quantity)
-    return found
-
-
-def as_parameters(
-    wanted: Mapping[str, ParameterLike] | Iterable[str | Parameter], experiments: Sequence[Experiment]
-) -> Parameters:
-    """Complete what a user wrote: initial value, unit, log scale and natural scale come from the scenes' quantities.
-
-    Args:
-        wanted: names, `Parameter`s, or a mapping from name to `Parameter`, to a mapping of its fields, or to None.
-
-    Raises:
-        InputError: a name that no scene has; the message lists the known ones.
-    """
-    if isinstance(wanted, str):
-        raise InputError("parameters", "must be a list of names", wanted, f"write ['{wanted}']")
-    known = quantities_of(experiments)
-    each = ((p.name, p) if isinstance(p, Parameter) else (p, None) for p in wanted)
-    items = wanted.items() if isinstance(wanted, Mapping) else each
-    complete = []
-    for name, given in items:
-        if name not in known:
-            raise InputError("parameters", "name no quantity of the scenes", name, choices(name, known))
-        if isinstance(given, Parameter):
-            complete.append(given)
-            continue
-        if not isinstance(given, Mapping | None):
-            fix = "give such as {'initial': 1e-3, 'lower': 1e-5, 'upper': 1.0}"
-            raise InputError(f"parameters.{name}", "must be a mapping of the fields of Parameter", given, fix)
-        fields: dict[str, Any] = dict(given or {})
-        unknown = set(fields) - set(Parameter.__dataclass_fields__)
-        if unknown:
-            fix = f"use: {', '.join(Parameter.__dataclass_fields__)}"
-            raise InputError(f"parameters.{name}", "has unknown fields", sorted(unknown), fix)
-        q = known[name]
-        if "tied_to" not in fields and not fields.get("private"):
-            fields.setdefault("initial", q.value)
-        defaults: dict[str, Any] = {"unit": q.unit, "log": q.positive, "scale": q.scale}
-        if q.limits is not None and "tied_to" not in fields:
-            defaults |= {"lower": q.limits[0], "upper": q.limits[1]}
-        merged = defaults | fields
-        if q.positive and not merged["log"]:
-            merged.setdefault("lower", 0.0)
-        complete.append(Parameter(name=name, **merged))
-    return Parameters(complete)
 
 
 class FitProblem:

@@ -27,6 +27,7 @@ import numpy as np
 
 from ..arrays.timeseries import Array
 from ..statistics.gauge import RANK_TOLERANCE
+from ..statistics.least_squares import solved
 from .approach import inside
 from .profile_shape import FAR_OFF, SAME, Point, bend, distance, telling
 
@@ -105,8 +106,7 @@ class ProfilePath:
         moves = (self.u > self.limits[0]) & (self.u < self.limits[1])
         moves[self.column] = False
         self._line = np.zeros(len(self.u))
-        slope = np.linalg.lstsq(R[:, moves] / size[moves], R[:, self.column], rcond=RANK_TOLERANCE)[0]
-        self._line[moves] = -slope / size[moves]
+        self._line[moves] = -solved(R[:, moves], R[:, self.column])
         self._line[self.column] = 1.0
         self.rise = 0.5 * (self.reach * float(np.linalg.norm(R @ self._line))) ** 2
         self._ridge = np.maximum(math.sqrt(2.0 * WEAK * self.rise) / self.longest, RANK_TOLERANCE * size)

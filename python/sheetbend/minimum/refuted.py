@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays.timeseries import Array
-from ..statistics.covariance import autocorrelation
+from ..statistics.spectral import autocorrelation
 from .problem import FitProblem
 
 CLEAR = 3.0  # standard deviations

@@ -20,7 +20,7 @@ from ..errors import InputError
 from ..experiment.experiment import Experiment
 from ..objects.stiffness_field import StiffnessField
 from ..quantities.parameters import Parameter, Parameters
-from ..statistics.covariance import autocorrelation
+from ..statistics.spectral import autocorrelation
 from .optimizers import Observer, walked
 from .parts import expanded_to
 from .problem import FitProblem

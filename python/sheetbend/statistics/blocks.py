@@ -26,8 +26,10 @@ import numpy as np
 
 from ..arrays.timeseries import Array
 from ..optional import require
-from .covariance import Covariance, Integers, Layout, Sandwich
+from .covariance import Covariance, Sandwich
 from .gauge import RANK_TOLERANCE, null_space
+from .layout import Integers, Layout
+from .least_squares import solved
 from .shared_errors import variance_of
 
 LEVEL = 0.01
@@ -165,8 +167,7 @@ def _compared(
         return None
     used = [*(c for c in used if c not in set(compared)), *compared]
     behind = slice(len(used) - len(compared), None)
-    size = np.linalg.norm(every[:, used], axis=0)
-    step = -np.linalg.lstsq(every[:, used] / size, left, rcond=None)[0] / size
+    step = -solved(every[:, used], left, rcond=None)
     after = left + every[:, used] @ step
     spread = Sandwich(after[:rows], every[:rows, used], layout, every[rows:, used], taken + len(private))
     told, apart = spread.of_estimate(), spread.at_right_angles()
@@ -181,8 +182,7 @@ def _compared(
     chance = float(require("scipy.special", "fit").fdtrc(len(scores), degrees, scores @ scores / len(scores)))
     physical = [c for c in used if c < count * parts]
     moved = np.zeros((every.shape[1], known.shape[1]))
-    scale = np.linalg.norm(every[:, physical], axis=0)
-    moved[physical] = np.linalg.lstsq(every[:, physical] / scale, known, rcond=None)[0] / scale[:, None]
+    moved[physical] = solved(every[:, physical], known, rcond=None)
     full, whole = np.zeros(every.shape[1]), np.zeros((every.shape[1], every.shape[1]))
     full[used], whole[np.ix_(used, used)] = step, V
     return _told(

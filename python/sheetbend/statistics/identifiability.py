@@ -17,9 +17,9 @@ from ..arrays.timeseries import Array
 from ..errors import InputError
 from ..quantities.parameters import Parameters
 from ..result.estimate import Correlation, Estimate
-from .covariance import Layout
 from .gauge import RANK_TOLERANCE, Gauge
 from .judge import Floor, Judge, Linear, Nuisance
+from .layout import Layout
 from .profile import Profile, Profiler
 
 

@@ -13,7 +13,7 @@ from ..optional import require
 from ..quantities.parameters import Parameter, Parameters
 from ..quantities.wording import figures, floor_words, quantity, ran_off_words, side_words
 from ..result.estimate import Correlation, Estimate
-from .covariance import Covariance, Layout, covariance
+from .covariance import Covariance, covariance
 from .gauge import Gauge, null_space
 from .intervals import (
     at_far_limit,
@@ -27,6 +27,7 @@ from .intervals import (
     ran_off,
     widened,
 )
+from .layout import Layout
 from .profile import FARTHEST, NOISELESS, Ends, Profile, Wanted
 from .shared_errors import variance_of, with_shared
 

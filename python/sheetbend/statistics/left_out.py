@@ -24,7 +24,9 @@ import numpy as np
 from ..arrays.timeseries import Array
 from ..optional import require
 from .blocks import Split, independent, padded, short_of_frames, solved_within
-from .covariance import Layout, covariance
+from .covariance import covariance
+from .layout import Layout
+from .least_squares import solved
 from .shared_errors import variance_of
 
 SURE = 0.05  # chance of a scatter as large
@@ -88,16 +90,14 @@ def left_out(
         used = independent(every)
         if rows <= len(used) + len(private):
             continue
-        size = np.linalg.norm(every[:, used], axis=0)
-        step = -np.linalg.lstsq(every[:, used] / size, left, rcond=None)[0] / size
+        step = -solved(every[:, used], left, rcond=None)
         left = left + every[:, used] @ step
         spread = covariance(left[:rows], every[:rows, used], layout, every[rows:, used], taken + len(private))
         V = short_of_frames(spread, int(np.ptp(layout.frame)) + 1) * spread.matrix
         if noise.any():
             V = V + variance_of(every[:, used], noise)
         own = [c for c in used if c < 2 * len(shared)]
-        scale = np.linalg.norm(every[:, own], axis=0)
-        moved = np.linalg.lstsq(every[:, own] / scale, known, rcond=None)[0] / scale[:, None]
+        moved = solved(every[:, own], known, rcond=None)
         for i, c in enumerate(used):
             if c >= len(shared):
                 break

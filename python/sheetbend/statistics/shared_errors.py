@@ -10,6 +10,7 @@ import numpy as np
 
 from ..arrays.timeseries import Array
 from .covariance import Covariance
+from .least_squares import solved
 
 
 def moved_by(jacobian: Array, errors: Array) -> Array:
@@ -18,10 +19,9 @@ def moved_by(jacobian: Array, errors: Array) -> Array:
     Args:
         jacobian: (rows + others, p), the rows of priors last; of these errors are zero.
     """
-    size = np.linalg.norm(jacobian, axis=0)
     full = np.zeros((len(jacobian), errors.shape[1]))
     full[: len(errors)] = errors
-    return np.asarray(-np.linalg.lstsq(jacobian / size, full, rcond=None)[0] / size[:, None])
+    return -solved(jacobian, full, rcond=None)
 
 
 def variance_of(jacobian: Array, errors: Array) -> Array:

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays.timeseries import Array
-from .covariance import Layout
+from .layout import Layout
 from .white_noise import white_noise
 
 OVERLAP = 4  # stretches begin apart by this part of their length

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays.timeseries import Array
-from .covariance import Layout
+from .layout import Layout
 
 
 def white_variance(before: Array, here: Array, after: Array) -> float:
