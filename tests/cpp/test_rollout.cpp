@@ -12,8 +12,8 @@ INSTANTIATE_TEST_SUITE_P(, RolloutOf, all_solvers, solver_name);
 TEST_P(RolloutOf, GradientMatchesComplexStep) {
   for (const unsigned seed : {50u, 51u}) {
     const Sample sample = random_scene(seed, GetParam().shape());
-    const Program program{sample.scene, make_plan(sample.scene, GetParam().options(2)), 10, 0.004};
-    const SignedSums sums(sample.scene.layout.size, 48);
+    const Program program{sample.scene, make_plan(sample.scene, GetParam().options(2)), 6, 0.004};
+    const SignedSums sums(sample.scene.layout.size, 96);
     const auto oracle =
         sums.by_complex_step([&](const std::vector<Complex>& z) { return loss(program, z); }, sample.inputs);
     Layout layout;

@@ -20,7 +20,7 @@ TEST_P(Substep, ReverseMatchesComplexStep) {
     const std::size_t dofs = scene.dofs();
     std::vector<std::size_t> parts(4, dofs);
     parts.insert(parts.end(), scene.layout.size.begin(), scene.layout.size.end());
-    const SignedSums sums(parts, 32);
+    const SignedSums sums(parts, 64);
     const auto oracle = sums.by_complex_step(
         [&](const std::vector<Complex>& z) {
           const auto out = forward(one, z);
