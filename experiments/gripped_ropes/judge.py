@@ -85,7 +85,11 @@ def missed_from_first_frame(fitted: RopeModel, told: dict[str, Any], unseen: Scr
     model = replace(
         model, density=true["density"], marker_mass=told["marker_mass"], places=False, beside=(), segments=LINKS
     ).with_values(**{k: true[k] for k in STRANGE if k in true})
-    model = replace(model, density_modes=tuple(int(k[-1]) for k in true if k.startswith("density_")))
+    modes = {
+        kind: tuple(int(k.rpartition("_")[2]) for k in true if k.startswith(f"{kind}_"))
+        for kind in ("density", "softness")
+    }
+    model = replace(model, density_modes=modes["density"], softness_modes=modes["softness"])
     model = model.at(known)
     pairs = zip(unseen, predict(model, unseen.motions, known), strict=True)
     return [coordinate_error(motion.recording, x) for motion, x in pairs]

@@ -1,14 +1,15 @@
 """Writes recordings of five synthetic ropes held by two moving grips, in the layout of the DEFORM rope data.
 
     python experiments/gripped_ropes/make_data.py FOLDER [--train 6] [--eval 3] [--ropes 5] [--seconds 5] [--seed 7]
-        [--nasty | --strange]
+        [--nasty | --strange | --laboratory]
 
 SYNTHETIC, no measurement. FOLDER/rope_1/train/00.pkl and so on, each a list of frames (3, markers) at 100 Hz, and
 FOLDER/rope_1.json with the true values. A recording depends on the seed, its rope, its set and its number alone.
 
 With --nasty the ropes have what real ones showed (`true_ropes`), some training files are spoiled (`spoil`), every other
 rope is written as lists of lists of numbers, and the JSON also tells what the true values miss of the eval recordings.
-With --strange it writes four ropes of which the recipe has no model (`strange`).
+With --strange it writes four ropes of which the recipe has no model (`strange`), with --laboratory three that change,
+slip or lose time as those of a laboratory do (`laboratory`).
 """
 
 from __future__ import annotations
@@ -16,12 +17,15 @@ from __future__ import annotations
 import argparse
 import json
 import pickle
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import sheetbend as sb
+from altered import as_kept, as_recorded, late, slipping
 from grip_motion import KNOTS, NOMINAL, UP, motion
+from laboratory import laboratory
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 from sheetbend.gripped import GrippedMotion
@@ -136,23 +140,26 @@ def free_markers(rope: Rope, nodes: Array, directors: Array) -> Array:
     return np.asarray(line(place) + rope.slack[:, :1] * first + rope.slack[:, 1:2] * np.cross(along, first))
 
 
-def gripped_markers(grip: Grip, back: float, ahead: float) -> Array:
-    """(frames, 2, 3) m: on the rope, so far before and after where it leaves the grip."""
+def gripped_markers(grip: Grip, back: float, ahead: float, rope: Rope) -> Array:
+    """(frames, 2, 3) m: on the grip, so far before and after where the rope leaves it."""
     pair = np.stack([grip.position - back * grip.direction, grip.position + ahead * grip.direction], axis=1)
-    return np.asarray(pair[::KNOTS][:-1])
+    return late(rope, pair, KNOTS)[::KNOTS][:-1]
 
 
 def recording(rope: Rope, part: str, number: int, seed: int, seconds: float) -> Array:
     """(frames, markers, 3) m, with noise."""
     rng = np.random.default_rng([seed, int(rope.name.removeprefix("rope_")), SETS.index(part), number])
+    found = as_recorded(rope, rng)
     while True:
         start, end = motion(rope, rng, seconds)
-        nodes, directors = simulated(rope, start, end, seconds)
+        nodes, directors = simulated(found, *slipping(rope, start, end, rng), seconds)
         if rope.rate**2 * np.linalg.norm(np.diff(nodes, 2, axis=0), axis=2).max() < SNAP:
             break
     free = free_markers(rope, nodes, directors)
-    clean = np.concatenate([gripped_markers(start, GRIPPED, 0.0), free, gripped_markers(end, 0.0, GRIPPED)], axis=1)
-    return clean + rope.louder * NOISE * rng.standard_normal(clean.shape)
+    grips = [gripped_markers(start, GRIPPED, 0.0, rope), gripped_markers(end, 0.0, GRIPPED, rope)]
+    clean = np.concatenate([grips[0], free, grips[1]], axis=1)
+    noisy = clean + rope.louder * NOISE * rng.standard_normal(clean.shape)
+    return as_kept(rope, noisy, rng) if part == "train" else noisy
 
 
 def write(path: Path, positions: Array, rope: Rope) -> None:
@@ -217,9 +224,9 @@ def main(
     seconds: float,
     seed: int,
     nasty: bool = False,
-    odd: bool = False,
+    odd: Callable[[int], list[Rope]] | None = None,
 ) -> None:
-    known = {rope.name: rope for rope in (strange(seed) if odd else ropes(seed, nasty))}
+    known = {rope.name: rope for rope in (odd(seed) if odd else ropes(seed, nasty))}
     for rope in list(known.values())[:count]:
         told = describe(rope, seed)
         for k in range(train):
@@ -250,6 +257,7 @@ if __name__ == "__main__":
     parser.add_argument("--seed", type=int, default=7)
     kind = parser.add_mutually_exclusive_group()
     kind.add_argument("--nasty", action="store_true")
-    kind.add_argument("--strange", action="store_true")
+    kind.add_argument("--strange", action="store_const", dest="odd", const=strange)
+    kind.add_argument("--laboratory", action="store_const", dest="odd", const=laboratory)
     given = parser.parse_args()
-    main(given.folder, given.train, given.eval, given.ropes, given.seconds, given.seed, given.nasty, given.strange)
+    main(given.folder, given.train, given.eval, given.ropes, given.seconds, given.seed, given.nasty, given.odd)

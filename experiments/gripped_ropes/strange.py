@@ -23,7 +23,7 @@ def strange(seed: int = 7) -> list[Rope]:
     first, second, third, fourth, _ = ropes(seed, nasty=True)
     weight = fourth.values["density"] * GRAVITY * fourth.length
     return [
-        _marked(
+        marked(
             replace(
                 _with(first, density_1=0.3, density_2=-0.2),
                 knot=(0.4, 0.1 * first.values["density"] * first.length),
@@ -33,7 +33,7 @@ def strange(seed: int = 7) -> list[Rope]:
             16,
             seed,
         ),
-        _marked(replace(_with(second, EI2=0.4 * second.values["EI"]), rate=120), 8, seed),
+        marked(replace(_with(second, EI2=0.4 * second.values["EI"]), rate=120), 8, seed),
         replace(
             _with(third, drag_linear=1e-6, drag_quadratic=0.02, twist_damping=4.0 * third.values["bend_damping"]),
             rate=60,
@@ -51,11 +51,11 @@ def _with(rope: Rope, **values: float) -> Rope:
     return replace(rope, values={**rope.values, **values})
 
 
-def _marked(rope: Rope, markers: int, seed: int) -> Rope:
-    """The same with so many markers, at uneven distances."""
+def marked(rope: Rope, markers: int, seed: int, beside: tuple[float, float] = (1e-3, 2e-3)) -> Rope:
+    """The same with so many markers, at uneven distances and from `beside[0]` to `beside[1]` m beside the axis."""
     rng = np.random.default_rng([seed, markers])
     free = markers - 4
-    around, off = rng.uniform(0.0, 2.0 * np.pi, free), rng.uniform(1e-3, 2e-3, free)
+    around, off = rng.uniform(0.0, 2.0 * np.pi, free), rng.uniform(*beside, free)
     slack = np.stack([off * np.cos(around), off * np.sin(around), rng.uniform(-3e-3, 3e-3, free)], axis=1)
     gaps: Array = rng.uniform(0.75, 1.3, free + 1)
     return replace(rope, markers=markers, slack=slack, places=rope.free_length * np.cumsum(gaps)[:-1] / gaps.sum())

@@ -35,6 +35,11 @@ class Rope:
         rate: Hz, of the frames.
         louder: noise of its markers over that of the others.
         axes: which axes of the simulation, whose third one points up, are the first to third of a recording.
+        creep: standard deviation between recordings of the size of its rest curvature, relative to it.
+        warming: share by which its stiffness differs between recordings at most, as temperature changes it.
+        slip: m, by which it slides out of each grip or into it at some time of a recording.
+        late: s, by which the markers of the grips lag behind the others.
+        lost, repeated: frames of a recording that are lost, and that repeat the frame before.
     """
 
     name: str
@@ -51,6 +56,12 @@ class Rope:
     rate: int = 100
     louder: float = 1.0
     axes: tuple[int, int, int] = (0, 1, 2)
+    creep: float = 0.0
+    warming: float = 0.0
+    slip: float = 0.0
+    late: float = 0.0
+    lost: int = 0
+    repeated: int = 0
 
     @property
     def free_length(self) -> float:

@@ -28,7 +28,7 @@ def script() -> Iterator[ModuleType]:
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(FOLDER))
         yield importlib.import_module("make_data")
-        for name in ("make_data", "grip_motion", "spoil", "strange", "true_ropes"):
+        for name in ("make_data", "grip_motion", "spoil", "strange", "altered", "laboratory", "true_ropes"):
             del sys.modules[name]
 
 
@@ -202,7 +202,7 @@ class TestStrange:
             patch.setattr(script, "SEGMENTS", 40)
             patch.setattr(script, "SUBSTEPS", 8)
             patch.setattr(script, "CREEP", ((1 / 100, 10.0),))
-            script.main(tmp_path, train=1, evaluation=1, count=2, seconds=0.5, seed=7, odd=True)
+            script.main(tmp_path, train=1, evaluation=1, count=2, seconds=0.5, seed=7, odd=script.strange)
         turned, quick = (sb.read_recordings(tmp_path / f"rope_{k}" / "train")[0] for k in (1, 2))
         assert turned.positions.shape == (50, 16, 3) and quick.positions.shape == (60, 8, 3)
         assert quick.times[1] == pytest.approx(1 / 120)
@@ -212,3 +212,45 @@ class TestStrange:
         assert flat.values["EI2"] == pytest.approx(0.4 * flat.values["EI"])
         sags = stretching.values["density"] * 9.81 * stretching.length / stretching.values["EA"]
         assert sags == pytest.approx(0.02)
+
+
+class TestLaboratory:
+    """Ropes that change or slip, and files that lose time."""
+
+    @pytest.fixture(autouse=True)
+    def coarse(self, script: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+        for name, value in {"SEGMENTS": 40, "SUBSTEPS": 8, "CREEP": ((1 / 100, 10.0),), "NOISE": 0.0}.items():
+            monkeypatch.setattr(script, name, value)
+
+    def test_a_rope_differs_from_recording_to_recording(self, script: ModuleType) -> None:
+        drum, *_ = script.laboratory(7)
+        found = script.as_recorded(drum, np.random.default_rng(0)).values
+        share = {name: found[name] / drum.values[name] for name in ("EI", "GJ", "curvature_1_0", "curvature_2_3")}
+        assert share["EI"] == pytest.approx(share["GJ"]) and 0.9 < share["EI"] < 1.1
+        assert share["curvature_1_0"] == pytest.approx(share["curvature_2_3"]) and share["curvature_1_0"] != 1.0
+
+    def test_connectors_make_the_ends_stiffer(self, script: ModuleType) -> None:
+        _, sleeved, _ = script.laboratory(7)
+        plain = script.ropes(7, nasty=True)[2]
+
+        def stiffness(rope: object, s: float) -> float:
+            modes = {k: v for k, v in rope.values.items() if k.startswith("softness_")}
+            return rope.values["EI"] / np.exp(sum(v * np.cos(int(k[9:]) * np.pi * s) for k, v in modes.items()))
+
+        for s, times in ((0.02, 4.0), (0.5, 1.0), (0.98, 4.0)):
+            assert stiffness(sleeved, s) / stiffness(plain, s) == pytest.approx(times, rel=0.2)  # a step as a series
+
+    def test_grips_come_late_and_frames_are_lost_or_repeat(self, script: ModuleType) -> None:
+        rope = replace(script.laboratory(7)[2], late=0.02)
+        kept = script.recording(rope, "train", 0, 7, 1.5)
+        assert len(kept) == 144 and 4 <= (np.diff(kept, axis=0) == 0.0).all(axis=(1, 2))[12:].sum() <= 6
+        late, prompt = (script.recording(replace(rope, late=by), "eval", 0, 7, 1.0) for by in (0.02, 0.0))
+        np.testing.assert_array_equal(late[:, 2:-2], prompt[:, 2:-2])
+        np.testing.assert_array_equal(late[2:, [0, 1, -2, -1]], prompt[:-2, [0, 1, -2, -1]])
+
+    def test_a_rope_slips_through_its_grips(self, script: ModuleType) -> None:
+        rope = script.laboratory(7)[1]
+        grips = script.motion(rope, np.random.default_rng(0), 2.0)
+        for grip, slid in zip(grips, script.slipping(rope, *grips, np.random.default_rng(1)), strict=True):
+            by = ((slid.position - grip.position) * grip.direction).sum(axis=1)
+            assert abs(by[0]) < 1e-6 and abs(by[-1]) == pytest.approx(rope.slip, abs=1e-6)

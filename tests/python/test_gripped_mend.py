@@ -214,6 +214,38 @@ class TestImpossible:
         assert mended(recording, INNER) == (recording, ())
 
 
+class TestLostFrames:
+    """A recorder that loses frames repeats one in their place, or goes on as if they had not been."""
+
+    def test_repeated_frames_are_left_out(self) -> None:
+        changed = moving()
+        for k in (50, 51, 200):
+            changed[k] = changed[k - 1]
+        found, (note,) = mended(recorded(changed), INNER)
+        np.testing.assert_array_equal(found.times, np.delete(TIMES, [50, 51, 200]))
+        np.testing.assert_array_equal(found.positions, np.delete(moving(), [50, 51, 200], axis=0))
+        assert note == "3 frames that are left out repeat the one before (frame 50 (0.5 s) and 2 later)"
+
+    def test_times_count_frames_that_are_missing(self) -> None:
+        lost = [81, 150, 185, 244]
+        found, (note,) = mended(recorded(np.delete(moving(), lost, axis=0)), INNER)
+        np.testing.assert_allclose(found.times, np.delete(TIMES, lost), atol=1e-9)
+        assert note == "4 frames were lost before frame 81 (0.81 s) and 3 later: later times count them"
+
+    def test_times_that_count_them_stay(self) -> None:
+        lost = [81, 150, 151, 244]
+        kept = np.delete(moving(), lost, axis=0)
+        recording = sb.Recording(kept, np.delete(TIMES, lost), clamped=(0, 1, 10, 11))
+        assert mended(recording, INNER) == (recording, ())
+
+    def test_a_rope_that_starts_stops_or_turns_back_lost_none(self) -> None:
+        still = np.repeat(moving()[:1], 100, axis=0)
+        jerked = moving()[:200] + 0.1 * (np.arange(200) >= 100)[:, None, None] * np.eye(3)[1] * TIMES[:200, None, None]
+        back = np.concatenate([moving()[:150], moving()[149::-1]])
+        for x in (np.concatenate([still, moving()[:150], still[:50]]), jerked, back):
+            assert not any("lost" in note or "repeat" in note for note in mended(recorded(x), INNER)[1])
+
+
 class TestScreened:
     def names(self, found: Screened) -> list[str]:
         return [m.recording.name for m in found]

@@ -1,5 +1,5 @@
-"""Mends a single recording of a gripped rope: exchanged neighbors, markers seen elsewhere, and tracking that froze or
-wrote zeros.
+"""Mends a single recording of a gripped rope: lost frames, exchanged neighbors, markers seen elsewhere, and tracking
+that froze or wrote zeros.
 
 All but the usual lengths of links are found from the recording alone. Two neighbors are exchanged at a frame at which
 the direction from one to the other turns round, and throughout where the line through all markers is then shorter,
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..arrays.timeseries import mean_position
 from ..recording.recording import Recording
 from .end_links import EndLink, end_link
+from .lost_frames import on_time
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -48,10 +49,11 @@ def mended(
     Returns:
         The recording, the same object where nothing was wrong, and a sentence on each thing that was.
     """
+    recording, told = on_time(recording)
     times, tracks = recording.times, range(recording.positions.shape[1])
     least, lost = _least_jump(times, recording.positions), _lost(recording)
     positions, words = _in_order(recording, inner, usual)
-    words = _each(recording, lost, "lay exactly at the origin") + words
+    words = [*told, *_each(recording, lost, "lay exactly at the origin"), *words]
     frozen = np.stack([_frozen(times, positions[:, k]) for k in tracks], axis=1) & ~_resting(positions)[:, None]
     frozen |= _stopped(times, positions)[:, None]
     positions[frozen] = np.nan
