@@ -259,10 +259,17 @@ def test_a_rope_on_a_floor_is_refused_with_where_its_configuration_is(tmp_path: 
         drafted(tmp_path, x)
 
 
-def test_the_axis_that_points_up_is_told_by_a_file(tmp_path: Path) -> None:
+def test_the_axis_that_points_up_is_told_or_guessed(tmp_path: Path) -> None:
     found, _ = drafted(tmp_path, kicked())
     (said,) = [sentence for sentence in found.seen if "is taken as up" in sentence]
-    assert said.startswith("z is taken as up") and '{"gravity": [0, -9.81, 0]} or so into take.json' in said
+    assert said.startswith("z is taken as up") and said.endswith("--up y or so")
+    recording = sb.Recording.load(tmp_path / "take.csv")
+    turned = sb.Recording(-recording.positions, recording.times, name="take", gravity=(0, -9.81, 0))
+    found = draft([Take(seen(turned, "-z"), "take.csv")], "take")  # the file is wrong
+    assert "-z points up, as given" in found.seen
+    assert tomllib.loads(found.text)["scene"]["gravity"] == [0.0, 0.0, 9.81]
+    content = tomllib.loads(draft([Take(seen(turned), "take.csv")], "take").text)
+    assert "gravity" not in content["scene"]
 
 
 def test_a_pendulum_in_millimeters(tmp_path: Path) -> None:

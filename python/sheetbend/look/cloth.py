@@ -195,7 +195,7 @@ def _wind(s: Seen, own: list[int], row: list[int], up: Array, density: float) ->
 
 def _lines(takes: Sequence[Take], sheets: Sequence[Sheet], density: float, measured: Measured) -> list[str]:
     s, r = takes[0].seen, takes[0].seen.recording
-    lines = [] if r.gravity is not None else table("[scene]", {"gravity": s.gravity.tolist()})
+    lines = [] if s.up_by == "file" else table("[scene]", {"gravity": s.gravity.tolist()})
     solver: dict[str, Any] = {"method": "newton"}
     if not s.static:
         if sheets[0].ride is not None:  # its clock is not that of the frames
