@@ -56,6 +56,28 @@ def test_a_corner_of_a_cloth_that_is_lost_for_a_moment(tmp_path: Path) -> None:
     assert 0.06 < content["recording"][0]["max_gap"] < 0.1
 
 
+def gathered(frames: int = 301) -> np.ndarray:
+    """A towel in two hands that are near each other: it hangs in folds that never open, and its upper row sags."""
+    u, v = (a.ravel() for a in np.meshgrid(0.1 * np.arange(6), 0.12 * np.arange(3, -1, -1)))
+    s = np.linspace(0.0, 0.5, 501)
+    t = np.arange(frames)[:, None] / RATE
+    angle = (0.9 + 0.1 * np.sin(4.0 * t)) * np.cos(4.0 * np.pi * s)
+    ways = np.stack([np.cos(angle), np.sin(angle)], axis=2)
+    ways = 1e-3 * np.concatenate([0.0 * ways[:, :1], np.cumsum(ways[:, :-1], axis=1)], axis=1)
+    level = ways[:, np.round(1e3 * u).astype(int)]
+    swing = 0.1 * (0.36 - v) * np.sin(5.0 * t)
+    return np.stack([level[..., 0], level[..., 1] + swing, 1.0 + v - 0.07 * np.sin(np.pi * u / 0.5) + 0.0 * t], axis=2)
+
+
+def test_a_towel_that_hangs_in_folds_is_as_large_as_its_rows(tmp_path: Path) -> None:
+    """Its folds and the sag of its upper row counted as its shape, and a flap was added below."""
+    _, content = drafted(tmp_path, gathered())
+    (cloth,) = content["scene"]["cloth"]
+    width, height = cloth["mesh"]["width"], cloth["mesh"]["height"]
+    assert width == pytest.approx(0.5, rel=0.03) and height == pytest.approx(0.36, rel=0.03)
+    assert {name for given in cloth["set"] for name in given["markers"]} == {"m0", "m5"}
+
+
 def kicked(rest: float = 0.4) -> np.ndarray:
     """A line between two posts that hangs, is pushed at once, and swings about the line of the posts; 13 markers."""
     t = np.maximum(np.arange(501) / RATE - rest, 0.0)[:, None]
