@@ -66,6 +66,7 @@ def _mocap(folder: Path) -> list[Files]:
         test_motion_capture.motive(folder / "take.csv"),
         test_motion_capture.motive(folder / "code.csv", timecode=True),
         test_motion_capture.vicon(folder),
+        test_motion_capture.qtm(folder),
     )
     texts = [*(path.read_bytes() for path in written), test_motion_capture.ROWS.encode()]
     return [{"take.csv": text} for text in texts]

@@ -77,6 +77,30 @@ def test_points_of_every_processor(tmp_path: Path, processor: int, scale: float,
     assert trial.gravity is None and trial.name == "trial"
 
 
+def test_lost_points_at_zero(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Some systems write no residual of points that they lost: these were markers at the origin."""
+    x = np.tile(X[:1], (30, 1, 1)) + np.array([2000.0, 0.0, 0.0])
+    x[7, 1] = 0.0
+    for name, value in {"X": x, "SEEN": np.ones(x.shape[:2], dtype=bool), "FRAMES": 30}.items():
+        monkeypatch.setitem(globals(), name, value)
+    trial = Recording.load(written(tmp_path))
+    assert np.argwhere(~trial.mask).tolist() == [[7, 1]]
+
+
+def test_more_frames_than_the_header_counts(tmp_path: Path) -> None:
+    """Eleven minutes at 100 Hz: what came later was left out without a word."""
+    count = 0x10000 + 4
+    path = written(tmp_path)
+    data = path.read_bytes()
+    trial = struct.pack("bb", 5, -2) + b"TRIAL" + words([3], INTEL) + b"\x00"
+    trial += parameter(2, "ACTUAL_START_FIELD", 2, [2], words([1, 0], INTEL), INTEL)
+    trial += parameter(2, "ACTUAL_END_FIELD", 2, [2], words([count - 0x10000, 1], INTEL), INTEL)
+    head = data[:6] + struct.pack("<HH", 1, 0xFFFF) + data[10 : BLOCK + 4]
+    said = (trial + data[BLOCK + 4 :])[: 2 * BLOCK - 4]
+    path.write_bytes(head + said + (count // FRAMES) * data[3 * BLOCK :])
+    assert len(Recording.load(path).times) == count
+
+
 def test_its_unit_holds_and_the_json_tells_the_rest(tmp_path: Path) -> None:
     path = written(tmp_path, units="m")
     path.with_suffix(".json").write_text('{"gravity": [0, -9.81, 0], "clamped": ["towel:a"]}')

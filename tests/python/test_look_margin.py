@@ -77,7 +77,7 @@ def test_a_lost_marker_leaves_out_its_frames_alone() -> None:
 def test_the_held_edge_of_a_cloth_in_wind(tmp_path: Path) -> None:
     """It is 38.9 mm above the upper row, at z = 0.7 m. The draft took half of the distance between markers in a row,
     31 mm: its edge was 5 mm too low."""
-    said = last_line(run("new", WIND, "--density", "0.15", "--output", tmp_path / "draft.toml", "--json"))
+    said = last_line(run("new", WIND, "--density", "0.15", "-o", tmp_path / "draft.toml", "--json"))
     (cloth,) = tomllib.loads((tmp_path / "draft.toml").read_text())["scene"]["cloth"]
     mesh = cloth["mesh"]
     assert [mesh["width"], mesh["height"]] == approx([0.5, 0.7], rel=0.01)  # stretched by 0.9 % as it hangs

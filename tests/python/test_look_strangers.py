@@ -56,6 +56,28 @@ def test_a_corner_of_a_cloth_that_is_lost_for_a_moment(tmp_path: Path) -> None:
     assert 0.06 < content["recording"][0]["max_gap"] < 0.1
 
 
+def gathered(frames: int = 301) -> np.ndarray:
+    """A towel in two hands that are near each other: it hangs in folds that never open, and its upper row sags."""
+    u, v = (a.ravel() for a in np.meshgrid(0.1 * np.arange(6), 0.12 * np.arange(3, -1, -1)))
+    s = np.linspace(0.0, 0.5, 501)
+    t = np.arange(frames)[:, None] / RATE
+    angle = (0.9 + 0.1 * np.sin(4.0 * t)) * np.cos(4.0 * np.pi * s)
+    ways = np.stack([np.cos(angle), np.sin(angle)], axis=2)
+    ways = 1e-3 * np.concatenate([0.0 * ways[:, :1], np.cumsum(ways[:, :-1], axis=1)], axis=1)
+    level = ways[:, np.round(1e3 * u).astype(int)]
+    swing = 0.1 * (0.36 - v) * np.sin(5.0 * t)
+    return np.stack([level[..., 0], level[..., 1] + swing, 1.0 + v - 0.07 * np.sin(np.pi * u / 0.5) + 0.0 * t], axis=2)
+
+
+def test_a_towel_that_hangs_in_folds_is_as_large_as_its_rows(tmp_path: Path) -> None:
+    """Its folds and the sag of its upper row counted as its shape, and a flap was added below."""
+    _, content = drafted(tmp_path, gathered())
+    (cloth,) = content["scene"]["cloth"]
+    width, height = cloth["mesh"]["width"], cloth["mesh"]["height"]
+    assert width == pytest.approx(0.5, rel=0.03) and height == pytest.approx(0.36, rel=0.03)
+    assert {name for given in cloth["set"] for name in given["markers"]} == {"m0", "m5"}
+
+
 def kicked(rest: float = 0.4) -> np.ndarray:
     """A line between two posts that hangs, is pushed at once, and swings about the line of the posts; 13 markers."""
     t = np.maximum(np.arange(501) / RATE - rest, 0.0)[:, None]
@@ -259,10 +281,17 @@ def test_a_rope_on_a_floor_is_refused_with_where_its_configuration_is(tmp_path: 
         drafted(tmp_path, x)
 
 
-def test_the_axis_that_points_up_is_told_by_a_file(tmp_path: Path) -> None:
+def test_the_axis_that_points_up_is_told_or_guessed(tmp_path: Path) -> None:
     found, _ = drafted(tmp_path, kicked())
     (said,) = [sentence for sentence in found.seen if "is taken as up" in sentence]
-    assert said.startswith("z is taken as up") and '{"gravity": [0, -9.81, 0]} or so into take.json' in said
+    assert said.startswith("z is taken as up") and said.endswith("--up y or so")
+    recording = sb.Recording.load(tmp_path / "take.csv")
+    turned = sb.Recording(-recording.positions, recording.times, name="take", gravity=(0, -9.81, 0))
+    found = draft([Take(seen(turned, "-z"), "take.csv")], "take")  # the file is wrong
+    assert "-z points up, as given" in found.seen
+    assert tomllib.loads(found.text)["scene"]["gravity"] == [0.0, 0.0, 9.81]
+    content = tomllib.loads(draft([Take(seen(turned), "take.csv")], "take").text)
+    assert "gravity" not in content["scene"]
 
 
 def test_a_pendulum_in_millimeters(tmp_path: Path) -> None:

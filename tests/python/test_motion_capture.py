@@ -228,6 +228,57 @@ def test_a_damaged_trial_is_refused(tmp_path: Path, old: str, new: str, words: s
         Recording.load(vicon(tmp_path, old, new))
 
 
+QTM = (
+    "FILE_VERSION\t2.0.0\r\nNO_OF_FRAMES\t3\r\nNO_OF_MARKERS\t2\r\nFREQUENCY\t100\r\nDESCRIPTION\t--\r\n"
+    "TIME_STAMP\t2024-03-11, 14:12:11.123\t3501.2\r\nDATA_INCLUDED\t3D\r\nMARKER_NAMES\ttip\tT 2\r\n"
+    "TRAJECTORY_TYPES\tMeasured\tMixed\r\nFrame\tTime\ttip X\ttip Y\ttip Z\tT 2 X\tT 2 Y\tT 2 Z\r\n"
+    "1\t0.00000\t1.0\t2.0\t3.0\tNULL\tNULL\tNULL\r\n2\t0.01000\t1.5\t2.0\t3.0\t\t\t\r\n3\t0.02000\t2.0\t2.0\t3.0\t4\t5\t6\r\n"
+)
+
+
+def qtm(folder: Path, *changes: tuple[str, str]) -> Path:
+    text = QTM
+    for old, new in changes:
+        assert re.search(old, text)
+        text = re.sub(old, new, text)
+    path = folder / "measurement.tsv"
+    path.write_text(text, newline="")
+    return path
+
+
+NO_TIME = (r"\n\d\t0\.0\d000\t", "\n")
+NO_HEAD = (r"Frame\tTime.*?\n", "")
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [(), (NO_HEAD,), (("Frame\tTime\t", ""), NO_TIME), (NO_HEAD, NO_TIME), (("\r\n", "\t\r\n"),), ((r"FILE.*\n", ""),)],
+)
+def test_a_measurement_of_qtm(tmp_path: Path, changes: tuple) -> None:
+    """It was refused as a table whose first column is no time."""
+    measured = Recording.load(qtm(tmp_path, *changes))
+    assert measured.markers == ("tip", "T 2")
+    assert measured.positions[:, 0].tolist() == [[1e-3, 2e-3, 3e-3], [1.5e-3, 2e-3, 3e-3], [2e-3, 2e-3, 3e-3]]
+    assert measured.mask[:, 1].tolist() == [False, False, True]
+    assert measured.times == pytest.approx([0.0, 0.01, 0.02]) and measured.gravity is None
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("FREQUENCY", "SPEED", "lacks FREQUENCY or MARKER_NAMES"),
+        ("FREQUENCY\t100", "FREQUENCY\t0", "line 4: must be the frames per second"),
+        ("MARKER_NAMES", "BODY_NAMES", "holds poses of rigid bodies"),
+        ("2\t0.01000\t1.5", "2\t0.01000\t1.5\t7", "line 12: must have 6 cells for 2 markers"),
+        ("2\t0.01000\t1.5", "2\t0.01000\t1o5", "line 12: holds a cell that is no number"),
+        ("(?s)Frame.*", "", "has a header but no rows"),
+    ],
+)
+def test_a_damaged_measurement_is_refused(tmp_path: Path, old: str, new: str, words: str) -> None:
+    with pytest.raises(RecordingError, match=words):
+        Recording.load(qtm(tmp_path, (old, new)))
+
+
 @pytest.mark.parametrize(
     ("name", "stamps", "seconds"),
     [

@@ -30,7 +30,9 @@ def collect(
             help="Output folders of fits, folders that contain such folders, or fit.json files.", show_default=False
         ),
     ],
-    output: Annotated[Path, typer.Option(help="Folder for the tables and the forest plot.")] = Path("out/collected"),
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the tables and the forest plot.")] = Path(
+        "out/collected"
+    ),
     json: Json = False,
 ) -> None:
     """Collect the fits of many specimens into one table, with the mean and spread of each parameter.

@@ -34,7 +34,7 @@ def compare(
     ],
     output: Annotated[
         Path | None,
-        typer.Option(help="Folder for compare.txt and compare.png. Default: nothing is written."),
+        typer.Option("--output", "-o", help="Folder for compare.txt and compare.png. Default: nothing is written."),
     ] = None,
     json: Json = False,
 ) -> None:

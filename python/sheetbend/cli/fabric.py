@@ -33,6 +33,8 @@ def fabric(
     output: Annotated[
         Path | None,
         typer.Option(
+            "--output",
+            "-o",
             help="Folder for the report, the figures and fabric.toml, which scenes can use. Default: out/NAME.",
             show_default=False,
         ),

@@ -55,6 +55,8 @@ def fit(
     output: Annotated[
         Path | None,
         typer.Option(
+            "--output",
+            "-o",
             help="Folder for fit.json, report.html, report.txt, figures and fitted.toml. Default: out/NAME.",
             show_default=False,
         ),

@@ -58,7 +58,8 @@ def identify(
         ),
     ] = None,
     output: Annotated[
-        Path | None, typer.Option(help="Folder for plan.json. Default: nothing is written.", show_default=False)
+        Path | None,
+        typer.Option("--output", "-o", help="Folder for plan.json. Default: nothing is written.", show_default=False),
     ] = None,
     json: Json = False,
 ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -40,6 +41,17 @@ ELSEWHERE = {
 """By an array of an archive what it holds beside markers, and where that is taken."""
 
 
+class Up(StrEnum):
+    """Directions along the axes of a recording."""
+
+    X = "x"
+    Y = "y"
+    Z = "z"
+    MINUS_X = "-x"
+    MINUS_Y = "-y"
+    MINUS_Z = "-z"
+
+
 def new(
     files: Annotated[
         list[Path],
@@ -51,7 +63,10 @@ def new(
     output: Annotated[
         Path | None,
         typer.Option(
-            help="The configuration file to write. Default: NAME.toml in the working directory.", show_default=False
+            "--output",
+            "-o",
+            help="The configuration file to write. Default: NAME.toml in the working directory.",
+            show_default=False,
         ),
     ] = None,
     density: Annotated[
@@ -63,6 +78,13 @@ def new(
     ] = None,
     units: Annotated[
         str | None, typer.Option(help="Length unit of the files: m, cm or mm.", show_default=False)
+    ] = None,
+    up: Annotated[
+        Up | None,
+        typer.Option(
+            help="Axis of the recording that points up, if the guess or the file is wrong.",
+            show_default=False,
+        ),
     ] = None,
     poses: Annotated[
         Path | None,
@@ -81,7 +103,7 @@ def new(
     Example: sheetbend new take.csv --density 0.05
     """
     measured = Measured(density, length)
-    run(lambda console: _new(console, files, output, measured, units, poses), json)
+    run(lambda console: _new(console, files, output, measured, units, up, poses), json)
 
 
 def _new(
@@ -90,6 +112,7 @@ def _new(
     output: Path | None,
     measured: Measured,
     units: str | None,
+    up: Up | None,
     poses: Path | None,
 ) -> Outcome:
     for option, given, fix in (
@@ -99,7 +122,7 @@ def _new(
         if given is not None and not 0 < given < float("inf"):
             raise ConfigError(option, "must be positive", given, fix)
     if is_mesh := files[0].suffix.lower() in garment.FILES:
-        _check_mesh(files, measured, poses)
+        _check_mesh(files, measured, up, poses)
         name = _name(files[0].stem)
     else:
         with options(units="--units"):
@@ -123,7 +146,7 @@ def _new(
             measured = replace(
                 measured, poses=Poses.read(poses, Path(os.path.relpath(poses, target.parent)).as_posix())
             )
-    takes = [Take(seen(r), file, unit) for file, (r, unit) in zip(named, recordings, strict=True)]
+    takes = [Take(seen(r, up), file, unit) for file, (r, unit) in zip(named, recordings, strict=True)]
     try:
         found = draft(takes, name, measured)
     except RecordingError as error:
@@ -151,7 +174,7 @@ def _written(console: Console, target: Path, name: str, found: Draft, source: st
     return Outcome({"name": name, "config": str(target)} | _said(found) | data)
 
 
-def _check_mesh(files: list[Path], measured: Measured, poses: Path | None) -> None:
+def _check_mesh(files: list[Path], measured: Measured, up: Up | None, poses: Path | None) -> None:
     """A garment comes in one file, has no length, and nothing moves it."""
     if poses is not None:
         raise ConfigError("--poses", "go with a recording, and the first file is a mesh", str(poses), "leave them out")
@@ -159,6 +182,10 @@ def _check_mesh(files: list[Path], measured: Measured, poses: Path | None) -> No
         raise ConfigError("FILES", "are several, and the first is a mesh", [str(f) for f in files], "give one mesh")
     if measured.length is not None:
         raise ConfigError("--length", "is of a rope or a beam", measured.length, "leave it out")
+    if up is not None:
+        raise ConfigError(
+            "--up", "is of a recording", str(up), "leave it out, and change `gravity` in the configuration"
+        )
 
 
 def _built(console: Console, target: Path) -> dict[str, Any]:

@@ -26,7 +26,8 @@ def schema(
         ),
     ] = "scene",
     output: Annotated[
-        Path | None, typer.Option(help="The file to write. Default: the schema is printed.", show_default=False)
+        Path | None,
+        typer.Option("--output", "-o", help="The file to write. Default: the schema is printed.", show_default=False),
     ] = None,
 ) -> None:
     """Print the JSON schema of a file, with which editors complete and check keys.

@@ -64,7 +64,8 @@ def simulate(
         ),
     ],
     output: Annotated[
-        Path | None, typer.Option(help="Folder for the trajectories. Default: out/NAME.", show_default=False)
+        Path | None,
+        typer.Option("--output", "-o", help="Folder for the trajectories. Default: out/NAME.", show_default=False),
     ] = None,
     duration: Annotated[
         float | None, typer.Option(help="Duration in s. Default: until the end of the recording.", show_default=False)

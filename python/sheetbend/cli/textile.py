@@ -86,7 +86,10 @@ def textile(
     output: Annotated[
         Path | None,
         typer.Option(
-            help="Folder for the report, the mean curve and the figure. Default: out/NAME.", show_default=False
+            "--output",
+            "-o",
+            help="Folder for the report, the mean curve and the figure. Default: out/NAME.",
+            show_default=False,
         ),
     ] = None,
     figures: Annotated[Form, typer.Option(help="Format of the figure.")] = "png",

@@ -33,7 +33,8 @@ def view(
         ),
     ],
     output: Annotated[
-        Path | None, typer.Option(help="The HTML file to write. Default: out/NAME.html.", show_default=False)
+        Path | None,
+        typer.Option("--output", "-o", help="The HTML file to write. Default: out/NAME.html.", show_default=False),
     ] = None,
     units: Annotated[
         str | None, typer.Option(help="Length unit of the recording: m, cm or mm.", show_default=False)

@@ -131,7 +131,7 @@ def _looked_at(s: Seen, base: tuple[int, ...], tip: tuple[int, ...], length: flo
 def _lines(take: Take, tip: tuple[int, ...], beam: Beam, measured: Measured) -> list[str]:
     s, r, length = take.seen, take.seen.recording, beam.length
     density = 1.0 if measured.density is None else measured.density
-    lines = [] if r.gravity is not None else table("[scene]", {"gravity": s.gravity.tolist()})
+    lines = [] if s.up_by == "file" else table("[scene]", {"gravity": s.gravity.tolist()})
     step = float(np.median(np.diff(r.times)))
     lines += table(
         "[solver]", {"substeps": max(1, int(np.ceil(step * 50 * beam.frequency)))}, {"substeps": "per frame"}

@@ -15,6 +15,7 @@ from .cloth_parts import cloth_parts
 from .cloth_sheet import Sheet
 from .cloth_words import lies_over, seen_of, unknown_of
 from .folded import folded
+from .lattice import in_rows
 from .margin import margin, pitches
 from .seen import Seen
 from .sheet import flattened, placed, spacing
@@ -125,12 +126,14 @@ def _looked_at(
 ) -> Sheet | None:
     """A cloth; None where something lies under it. Bars point where its rows beside them do, if not given."""
     r = s.recording
-    flat = flattened(s.apart[np.ix_(own, own)])
+    apart = s.apart[np.ix_(own, own)]
+    flat = flattened(apart)
+    rows = in_rows(apart, flat)
+    flat = flat if rows is None else rows
     start = int(np.argmax(r.mask[:, own].sum(axis=1)))
     up = -s.gravity / np.linalg.norm(s.gravity)
     place, axes, flat = placed(flat, r.positions[start, own], up)
-    apart = spacing(s.apart[np.ix_(own, own)])
-    axis, rise = slung(r.positions[:, own], flat, up, apart)
+    axis, rise = slung(r.positions[:, own], flat, up, spacing(apart))
     if rise < -SAGS:
         return None
     is_slung = rise > SAGS
@@ -138,7 +141,7 @@ def _looked_at(
         place = place + axes[0] * np.ptp(flat[:, 0])
         flat = np.stack([flat[:, 1], np.ptp(flat[:, 0]) - flat[:, 0]], axis=1)
         axes = np.stack([axes[1], -axes[0]])
-    found = slack(s, own, flat, apart) if is_slung else None
+    found = slack(s, own, flat, spacing(apart)) if is_slung else None
     if found is not None:
         flat = flat * [found.length / np.ptp(flat[:, 0]), 1.0]
     held = holds(s, own, flat, others, ("left", "right") if is_slung else ("top",), bars)
@@ -149,8 +152,6 @@ def _looked_at(
     beyond = {hold.side: hold.beyond for hold in held}
     if found is not None:  # the cloth is stretched there too
         beyond |= {side: beyond[side] * found.length / found.first for side in ("left", "right") if side in beyond}
-    if any(hold.corners and hold.own for hold in held):  # who holds two corners has them in the hands
-        beyond |= dict.fromkeys(("left", "right"), 0.0)
     free = share(held) * pitches(flat)
     low, high = (
         np.array([beyond.get(side, free[SIDES[side][0]]) for side in sides])
@@ -158,7 +159,7 @@ def _looked_at(
     )
     width, height = (np.ptp(flat, axis=0) + low + high).tolist()
     at_rest = not s.static and not any(hold.moves for hold in held) and not is_slung
-    wind = _wind(s, own, [own[k] for k in row_of(flat, held[0].side, apart)], up, density) if at_rest else None
+    wind = _wind(s, own, [own[k] for k in row_of(flat, held[0].side, spacing(apart))], up, density) if at_rest else None
     origin = place - axes.T @ low
     for edge in (hold.edge for hold in held if ride is None and not is_slung):
         if edge is not None:  # all frames show an edge at rest
@@ -195,7 +196,7 @@ def _wind(s: Seen, own: list[int], row: list[int], up: Array, density: float) ->
 
 def _lines(takes: Sequence[Take], sheets: Sequence[Sheet], density: float, measured: Measured) -> list[str]:
     s, r = takes[0].seen, takes[0].seen.recording
-    lines = [] if r.gravity is not None else table("[scene]", {"gravity": s.gravity.tolist()})
+    lines = [] if s.up_by == "file" else table("[scene]", {"gravity": s.gravity.tolist()})
     solver: dict[str, Any] = {"method": "newton"}
     if not s.static:
         if sheets[0].ride is not None:  # its clock is not that of the frames

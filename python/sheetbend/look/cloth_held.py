@@ -79,7 +79,10 @@ class Hold:
 
 def share(held: Sequence[Hold]) -> float:
     """By how much a cloth goes on beyond its outer markers where nothing holds it, over the distance between markers:
-    as beyond the row next to what holds it, for want of better knowledge."""
+    as beyond the row next to what holds it, for want of better knowledge. Not at all where the corners of the markers
+    are in the hands, so that the markers end at the edges."""
+    if any(hold.corners and hold.own for hold in held):
+        return 0.0
     return next((hold.margin.share for hold in held if hold.margin is not None), HALF)
 
 

@@ -26,10 +26,13 @@ def seen_of(s: Seen, sheet: Sheet, several: bool) -> list[str]:
     names, held = s.recording.markers, []
     apart = spacing(s.apart[np.ix_(sheet.own, sheet.own)])
     whose = f"{sheet.name}: " if several else ""
+    beyond = share(sheet.held)
+    ends = (
+        f"with {beyond:.2g} of that beyond the outer ones where nothing holds it" if beyond else "up to the outer ones"
+    )
     notes = [
         f"{whose}{len(sheet.own)} markers lie on a sheet, some {1e3 * apart:.3g} mm apart: a cloth of "
-        f"{sheet.width:.3g} x {sheet.height:.3g} m with {share(sheet.held):.2g} of that beyond the outer ones where "
-        "nothing holds it"
+        f"{sheet.width:.3g} x {sheet.height:.3g} m {ends}"
     ]
     for hold in sheet.held:
         of = joined(names[k] for k in hold.markers)
@@ -98,12 +101,15 @@ def unknown_of(s: Seen, sheets: Sequence[Sheet], measured: Measured) -> list[str
                 "it with a ruler, and correct `height`, `origin` and the markers' places: in one example the "
                 "prediction was off by 7 mm with the true 40 mm, and by 13 mm with 51 mm"
             )
-    part = "the same share of the distance between them as next to the held edge"
+    part = "the same share of the distance between them as next to the held edge is taken"
     shares = {share(sheet.held) for sheet in sheets}
+    if shares == {HALF}:
+        part = "half of the distance between them is taken"
+    elif shares == {0.0}:
+        part = "nothing is taken, as beyond those in the hands"
     said.append(
-        "how far the cloth goes on beyond its other outer markers: "
-        f"{'half of the distance between them' if shares == {HALF} else part} is taken, and its weight and the air on "
-        "it count. Measure it with a ruler, and correct `width`, `height`, `origin` and the markers' places"
+        f"how far the cloth goes on beyond its other outer markers: {part}, and its weight and the air on it count. "
+        "Measure it with a ruler, and correct `width`, `height`, `origin` and the markers' places"
     )
     if windy:
         said.append(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import PurePosixPath
 
 import numpy as np
 
@@ -114,16 +113,18 @@ def _told(takes: Sequence[Take], up: int | None) -> list[str]:
         said.append(f"the fastest marker moves at {first.speed:.2g} m/s")
     if takes[0].units is not None:
         said.append(f"lengths are taken as {takes[0].units}")
-    if not first.told and up is not None:
+    if first.up_by == "guess" and up is not None:
         said.append(f"{'xyz'[up]} points up: gravity accelerates the markers along it")
-    elif not first.told:
+    elif first.up_by == "guess":
         axis = "xyz"[first.up]
-        gravity = [-9.81 if k == (1 if axis == "z" else 2) else 0 for k in range(3)]
-        beside = PurePosixPath(takes[0].file).with_suffix(".json").name
         said.append(
-            f"{axis} is taken as up, because the file does not say it. If another axis is, write "
-            f'{{"gravity": {gravity}}} or so into {beside} beside the recording, and begin again'
+            f"{axis} is taken as up, because the file does not say it. If another axis is, begin again with "
+            f"--up {'y' if axis == 'z' else 'z'} or so"
         )
+    else:
+        down = int(np.argmax(np.abs(first.gravity)))
+        axis = ("-" if first.gravity[down] > 0 else "") + "xyz"[down]
+        said.append(f"{axis} points up, as {'the file says' if first.up_by == 'file' else 'given'}")
     return said
 
 

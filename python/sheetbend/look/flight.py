@@ -54,7 +54,7 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     if len(takes) > 1 or len(s.bodies) != 1 or len(s.bodies[0]) < len(r.markers):
         return None
     # a fall shows which axis is up, where the file does not say it
-    ups = [s] if s.told else [replace(s, up=up) for up in (s.up, 3 - s.up)]
+    ups = [s] if s.up_by != "guess" else [replace(s, up=up) for up in (s.up, 3 - s.up)]
     found = [(flight, seen) for seen in ups if (flight := _longest(seen)) is not None]
     if not found:
         return None
@@ -162,7 +162,7 @@ def _lines(take: Take, flight: Flight, reach: float) -> list[str]:
     s, r = take.seen, take.seen.recording
     t = r.times[flight.frames]
     step, spin = float(np.median(np.diff(r.times))), float(np.linalg.norm(flight.start["spin"]))
-    lines = [] if r.gravity is not None else table("[scene]", {"gravity": s.gravity.tolist()})
+    lines = [] if s.up_by == "file" else table("[scene]", {"gravity": s.gravity.tolist()})
     lines += table("[solver]", {"substeps": int(np.ceil(step * max(1.0 / SUBSTEP, spin / TURN)))})
     body: dict[str, Any] = {"name": "body", "mass": 1.0, "inertia": flight.inertia.tolist()} | flight.start
     said = {"mass": "kg, not known: see above", "inertia": "kg m^2, of equal masses at the markers"}

@@ -48,5 +48,5 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     rope: dict[str, Any] = {"name": "rope", "density": measured.density, "train": str(paths[0].parent)}
     rope["pattern"] = paths[0].name if len(takes) == 1 else f"*{paths[0].suffix}"
     rope |= {"units": takes[0].units, "clamped": [r.markers[k] for k in clamped]}
-    rope["gravity"] = None if r.gravity is not None else s.gravity.tolist()
+    rope["gravity"] = None if s.up_by == "file" else s.gravity.tolist()
     return Description("a rope between two grips", notes, unknown, table("[[gripped_rope]]", rope))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import NormalDist
+from typing import Literal
 
 import numpy as np
 
@@ -42,8 +43,8 @@ class Seen:
         noise: m per coordinate; 0 where the recording is too short to tell.
         rest: s, for how long nothing moves at the beginning.
         speed: m/s, of the fastest marker, smoothed; 99 % of the frames are slower.
-        up: 0, 1 or 2, the axis along which gravity points down.
-        told: whether the file says it.
+        up: 0, 1 or 2, the axis along which gravity points.
+        up_by: who says which way that is: the file, who began the draft, or nobody.
         rare: names of markers that are hardly ever seen, and left out.
         sheet: whether the loose markers lie on a sheet rather than along a line.
     """
@@ -57,7 +58,7 @@ class Seen:
     rest: float
     speed: float
     up: int
-    told: bool
+    up_by: Literal["file", "user", "guess"]
     sheet: bool
     rare: tuple[str, ...] = ()
 
@@ -68,18 +69,25 @@ class Seen:
 
     @property
     def gravity(self) -> Array:
-        """(3,) m/s^2, the recording's own, or that along `up`."""
+        """(3,) m/s^2, as told, else along `up`."""
         if self.recording.gravity is not None:
             return np.asarray(self.recording.gravity)
         return np.where(np.arange(3) == self.up, -EARTH, 0.0)
 
 
-def seen(recording: Recording) -> Seen:
+def seen(recording: Recording, up: str | None = None) -> Seen:
     """Look at a recording.
+
+    Args:
+        recording: with lengths in m.
+        up: which way is up, such as "y" or "-z", in place of what the file says.
 
     Raises:
         RecordingError: two markers are never seen together.
     """
+    if up is not None:
+        down = np.where(np.array(list("xyz")) == up[-1], EARTH if up[0] == "-" else -EARTH, 0.0)
+        recording = replace(recording, gravity=down)
     often = recording.mask.mean(axis=0)
     rare = tuple(name for name, share in zip(recording.markers, often, strict=True) if share < RARE * often.max())
     if rare:
@@ -101,7 +109,7 @@ def seen(recording: Recording) -> Seen:
     bodies = [] if len(t) < 3 else _bodies(change <= np.maximum(RIGID * noise, 1e-3 * apart), apart, still)
     in_bodies = {k for body in bodies for k in body}
     loose = tuple(k for k in range(count) if not still[k] and k not in in_bodies)
-    up, told = _up(recording)
+    axis, told = _up(recording)
     return Seen(
         recording=recording,
         still=tuple(int(k) for k in np.flatnonzero(still)),
@@ -111,8 +119,8 @@ def seen(recording: Recording) -> Seen:
         noise=noise,
         rest=_rest(recording, max(noise, 1e-4 * extent)),
         speed=_speed(recording),
-        up=up,
-        told=told,
+        up=axis,
+        up_by="user" if up is not None else "file" if told else "guess",
         sheet=_is_sheet(x, apart, in_bodies),
         rare=rare,
     )

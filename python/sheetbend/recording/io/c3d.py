@@ -1,9 +1,9 @@
 """C3D, the binary format of motion capture systems (www.c3d.org): its points, in integers or floats, from PCs, DECs and
 MIPS machines.
 
-Points that were not seen carry a negative residual. Analog channels are left out, and so are points that are no places
-(angles, forces, moments and powers that a biomechanical model adds) and points never seen. Times count from the first
-frame of the file. The file does not say which way is down.
+Points that were not seen carry a negative residual, or lie at exactly 0, 0, 0. Analog channels are left out, and so are
+points that are no places (angles, forces, moments and powers that a biomechanical model adds) and points never seen.
+Times count from the first frame of the file. The file does not say which way is down.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ...errors import RecordingError
 from ...files.units import METERS
 from ..marker_data import MarkerData
+from .lost import without_zeros
 
 Array = NDArray[np.float64]
 
@@ -28,6 +29,7 @@ _KEY = 0x50
 _ORDERS = {84: "<", 85: "<", 86: ">"}
 _DEC = 85
 _MOST_BLOCKS = 255  # of parameters: a byte counts them
+_LONG = 0xFFFF  # frames: the header counts no more
 _NO_PLACES = ("ANGLES", "FORCES", "MOMENTS", "POWERS")
 
 
@@ -80,7 +82,7 @@ def _recording(path: Path, data: bytes, machine: _Machine, said: dict[tuple[str,
         fix = f"export it in {', '.join(METERS)}"
         raise RecordingError(str(path), "names no known length unit", units, fix)
     size = 4 if scale < 0 else 2
-    frames = last - first + 1
+    frames = _frames(said, first, last)
     begin, width = (start - 1) * _BLOCK, (4 * count + analog) * size
     body = data[begin : begin + frames * width]
     if count == 0 or frames < 1 or len(body) < frames * width:
@@ -90,6 +92,7 @@ def _recording(path: Path, data: bytes, machine: _Machine, said: dict[tuple[str,
     points = table[:, : 4 * count].reshape(frames, count, 4)
     x = points[:, :, :3] * (1.0 if scale < 0 else scale)
     x[points[:, :, 3] < 0] = np.nan
+    x = without_zeros(x)
     names = _labels(said, count)
     added = {label for kind in _NO_PLACES for label in said.get(("POINT", kind), [])}
     keep = [k for k in range(count) if names[k] not in added and not np.isnan(x[:, k, 0]).all()]
@@ -97,6 +100,14 @@ def _recording(path: Path, data: bytes, machine: _Machine, said: dict[tuple[str,
         raise RecordingError(str(path), "holds no point that is ever seen", f"{count} points", "export the markers")
     markers = tuple(names[k] for k in keep)
     return MarkerData(x[:, keep], np.arange(frames) / rate, markers, metadata={"units": units})
+
+
+def _frames(said: dict[tuple[str, str], Any], first: int, last: int) -> int:
+    """How many frames there are: as the header tells, or the group TRIAL where the header's numbers end."""
+    start, stop = (said.get(("TRIAL", f"ACTUAL_{which}_FIELD"), []) for which in ("START", "END"))
+    if last == _LONG and len(start) == len(stop) == 2:
+        first, last = ((int(low) & _LONG) + ((int(high) & _LONG) << 16) for low, high in (start, stop))
+    return last - first + 1
 
 
 def _labels(said: dict[tuple[str, str], Any], count: int) -> list[str]:

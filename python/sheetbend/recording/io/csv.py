@@ -1,4 +1,4 @@
-"""Recordings as text tables: exports of motion capture systems (`motive`, `motive_rows`, `vicon`), or one of two
+"""Recordings as text tables: exports of motion capture systems (`motive`, `motive_rows`, `vicon`, `qtm`), or one of two
 layouts, told apart by the header.
 
 Wide, one row per frame, three columns per marker:
@@ -35,7 +35,7 @@ from ...errors import RecordingError
 from ...files.door import check_room
 from ...files.whole import written
 from ..marker_data import MarkerData
-from . import clock, columns, motive, motive_rows, sidecar, vicon
+from . import clock, columns, motive, motive_rows, qtm, sidecar, vicon
 from .cells import Row, lines, number, refuse, split
 from .lost import without_zeros
 
@@ -53,7 +53,7 @@ def read(path: Path) -> MarkerData:
             markers at many times would make a table larger than `door.check_room` allows.
     """
     text = lines(path)
-    for system in (motive, motive_rows, vicon):
+    for system in (motive, motive_rows, vicon, qtm):
         if system.wrote(text):
             return system.read(path, text)
     (header_line, header), *rows = _rows(path, text)
