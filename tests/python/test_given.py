@@ -95,6 +95,25 @@ def test_an_error_moves_what_a_refit_moves(clean: sb.Recording, name: str) -> No
         assert found.moved[parameter] == pytest.approx(moved, rel=0.01, abs=size), parameter
 
 
+def test_what_markers_weigh_moves_what_a_refit_moves(clean: sb.Recording) -> None:
+    """Beyond the masses that the model gives them; at most 1 % of what is free, all together."""
+
+    def loaded(mass: float, EI: float = 1.3e-3) -> sb.Scene:
+        scene = hanging(EI=EI)
+        for k in places(scene):
+            scene.add_point_mass(k, mass, f"m{k}")
+        return scene
+
+    true = loaded(1e-4, TRUTH["EI"])
+    clean = replace(clean, positions=sb.simulate(true, TIMES, SOLVER).positions[:, places(true)])
+    found, d = premise(fit(loaded(1e-4), clean), "mass of each marker"), 4e-6
+    assert found.words == "0.039 g each" and found.off_by == pytest.approx(0.01 * (0.019 + 5e-4) / 5)
+    ends = [fit(loaded(1e-4 + sign * d), clean).values for sign in (1, -1)]
+    for parameter in FITTED:
+        moved = (ends[0][parameter] - ends[1][parameter]) / (2 * d) * found.off_by
+        assert found.moved[parameter] == pytest.approx(moved, rel=0.01), parameter
+
+
 def test_turned_clamps_move_what_a_refit_moves(clean: sb.Recording) -> None:
     """The whole scene turns, its start too, about the middle of what is held."""
     base = fit(hanging(), clean)

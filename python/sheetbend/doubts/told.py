@@ -24,6 +24,7 @@ from ..objects.markers import Place
 from ..quantities.quantities import Quantity
 from ..quantities.wording import short
 from ..recording.recording import Recording
+from .marker_mass import MOST_EACH, marker_load, unseen_mass
 from .tangents import Input, tangents
 
 Rows = slice | NDArray[np.bool_]
@@ -43,11 +44,13 @@ GROUPS: Mapping[str, tuple[str, tuple[float, str]]] = {
     "recording_size": ("", (5e-3, "0.5 %")),
     "drive_size": ("", (0.01, "1 %")),
     "drive_place": ("m", STEPS["m"]),
+    "marker_mass": ("kg", (MOST_EACH, f"{short(1e3 * MOST_EACH)} g each")),
 }
 """Told numbers that are no quantities, by the name under which a standard deviation is given: unit (none of what is
 relative) and step."""
 SIZE, LATER, SLOWER, LARGER = "size of gravity", "frames later", "clock", "size of the recording"
 FARTHER, ASIDE = "path of what drives the scene", "place of what drives the scene"
+WEIGHTS = "mass of each marker"
 _NONE = np.zeros(0)
 
 
@@ -133,11 +136,14 @@ def _collect(
         (1.0, Told(i, "collider_direction", at, "rad", STEPS["rad"], _NONE, missing=_turned(at), signed=True))
         for at in turns
     ]
-    path = _path(e, e.scene.compiled.inputs(theta[slots[i]]))
+    inputs = e.scene.compiled.inputs(theta[slots[i]])
+    path, weights = _path(e, inputs), _weights(e, inputs)
     made += [(1.0, Told(i, "drive_size", FARTHER, *GROUPS["drive_size"], _NONE, relative=True)) for _ in path]
+    made += [(1.0, Told(i, "marker_mass", label, "kg", step, _NONE)) for label, (step, _) in weights.items()]
     by_gravity: dict[int, Array] = {}
     if made:
-        columns = tangents(problem, u, i, names | size | turns | path, asked, corrected)
+        loads = {label: load for label, (_, load) in weights.items()}
+        columns = tangents(problem, u, i, names | size | turns | path | loads, asked, corrected)
         for (weight, one), column in zip(made, columns.T, strict=True):
             yield replace(one, column=weight * column)
         by_gravity = {axis: columns[:, len(asked) + n] for n, axis in enumerate(toward)}
@@ -176,6 +182,14 @@ def _path(e: Experiment, inputs: Array) -> dict[str, Input]:
     knots = inputs[first : first + size].reshape(len(e.scene.boundary.times), -1)
     moved = (knots - knots[0]).ravel()
     return {FARTHER: ("boundary", np.flatnonzero(moved), moved[moved != 0.0])} if moved.any() else {}
+
+
+def _weights(e: Experiment, inputs: Array) -> dict[str, tuple[tuple[float, str], Input]]:
+    """What each marker may weigh without a mass in the model, and where that hangs."""
+    first, size = e.scene.compiled.layout["mass"]
+    each, load = unseen_mass(e, inputs[first : first + size]), marker_load(e)
+    at = np.flatnonzero(load)
+    return {WEIGHTS: ((each, f"{short(1e3 * each, 2)} g each"), ("mass", at, load[at]))} if each > 0.0 else {}
 
 
 def _turned(label: str) -> Callable[[float], str]:

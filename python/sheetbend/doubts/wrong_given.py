@@ -201,6 +201,7 @@ def _directions(
     """The errors that motions may share, or that one of them may have: (rows,) what each changes. Of given losses only
     some."""
     rows, first, others = problem.core.rows, problem.core.first_rows, set(held_names(problem)) - set(losses)
+    others |= {"marker_mass"}  # which is asked among what the model lacks
     within = [one for one in told if one.experiment in group and one.name not in others]
     apart = len(within) * rows <= LONGEST
     each: dict[str, tuple[Told, Array]] = {}

@@ -119,6 +119,8 @@ def _size(premise: Premise, error: float) -> str:
         return f"{short(math.degrees(error), 2)} degrees"
     if premise.unit == "s":
         return f"{short(1e3 * error, 2)} ms"
+    if premise.unit == "kg" and premise.name == "mass of each marker":
+        return f"{short(1e3 * error, 2)} g each"
     if premise.unit == "m":
         return f"{short(1e3 * error, 2)} mm{' each' if premise.name == 'markers' else ''}"
     return f"{short(error, 2)} {premise.unit}".rstrip()
