@@ -8,20 +8,23 @@ import random
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import sheetbend as sb
 import test_c3d
 import test_config_cloth
+import test_journal
 import test_motion_capture
 import test_readers
 import test_written_files
-from mutations import json_tree, mutated, packed, toml_tree
+from mutations import database, json_tree, mutated, packed, toml_tree
 from sheetbend import config
 from sheetbend.cli.gripped import load_ropes
 from sheetbend.files.door import reading
 from sheetbend.files.names import flaw
+from sheetbend.minimum import journal
 from sheetbend.report.fit_result import FitResult
 from sheetbend.result import result
 from sheetbend.scene.scene_reader import MAGIC, PREFIX, VERSION
@@ -205,6 +208,12 @@ def _forces(folder: Path) -> list[Files]:
     return [{"f.csv": table.encode()}, {"f.csv": cell.encode()}, {"f.npz": archive}]
 
 
+def _journals(folder: Path) -> list[Files]:
+    with journal.Journal(folder / "a.sqlite", {"[fit]": "abc"}):
+        _evaluated()
+    return [{"a.sqlite": (folder / "a.sqlite").read_bytes()}]
+
+
 # ---- readers --------------------------------------------------------------------------------------------
 
 
@@ -240,6 +249,33 @@ def _scene(path: Path) -> None:
     assert sb.load_scene(path).compiled
 
 
+def _evaluated() -> list[bytes]:
+    """A problem's residuals and Jacobian, or residuals alone, at a few points."""
+    problem = test_journal.problem_of(test_journal.swinging())
+    points = [problem.parameters.initial() + 0.01 * k for k in range(4)]
+    found = [problem.evaluate(u, jacobian=bool(k % 2)) for k, u in enumerate(points)]
+    return [r.tobytes() + J.tobytes() for _, r, J in found]
+
+
+def _journal(path: Path) -> None:
+    """What it holds counts only with its bits."""
+    try:
+        with journal.Journal(path, {"[fit]": "abc"}):
+            assert _evaluated() == _evaluated_without()
+    finally:
+        for end in ("-wal", "-shm"):
+            path.with_name(path.name + end).unlink(missing_ok=True)
+
+
+@cache
+def _evaluated_without() -> list[bytes]:
+    kept = journal._current.set(None)
+    try:
+        return _evaluated()
+    finally:
+        journal._current.reset(kept)
+
+
 def sealed(rng: random.Random, content: bytes, others: list[bytes]) -> bytes:
     """A scene file changed anywhere or, with its checksum and length right again, in its header or its arrays."""
     if rng.random() < 0.3:
@@ -270,4 +306,5 @@ TARGETS: dict[str, Target] = {
     "poses": Target(_poses, sb.Tool.load, mutated),
     "scene": Target(_scenes, _scene, sealed),
     "forces": Target(_forces, sb.ForceRecording.load, mutated),
+    "journal": Target(_journals, _journal, database),
 }

@@ -6,10 +6,14 @@ import copy
 import json
 import random
 import re
+import sqlite3
 import tomllib
 import zipfile
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from io import BytesIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import tomli_w
@@ -110,6 +114,34 @@ def packed(rng: random.Random, content: bytes, others: list[bytes]) -> bytes:
         for each, inside in members.items():
             archive.writestr(each, inside)
     return stream.getvalue()
+
+
+def database(rng: random.Random, content: bytes, others: list[bytes]) -> bytes:
+    """An SQLite file changed in its bytes, in a value, or in its tables."""
+    if rng.random() < 0.5:
+        return mutated(rng, content, others)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "changed"
+        path.write_bytes(content)
+        with closing(sqlite3.connect(path, isolation_level=None)) as opened:
+            tables = [name for (name,) in opened.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
+            table = rng.choice(tables)
+            columns = [row[1] for row in opened.execute(f"PRAGMA table_info({table})")]
+            column, kind = rng.choice(columns), rng.random()
+            rows = opened.execute(f"SELECT rowid, {column} FROM {table}").fetchall()
+            if kind < 0.8 and rows:
+                row, value = rng.choice(rows)
+                raw = value if isinstance(value, bytes) else str(value).encode()
+                odd = (mutated(rng, raw, [raw]), raw[:-1], None, -1, 1e300, "x", b"")
+                opened.execute(f"UPDATE OR IGNORE {table} SET {column} = ? WHERE rowid = ?", (rng.choice(odd), row))
+            elif kind < 0.9:
+                opened.execute(f"ALTER TABLE {table} RENAME COLUMN {column} TO other")
+            else:
+                opened.execute(f"ALTER TABLE {table} RENAME TO other")
+                endless = "WITH RECURSIVE n(k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n)"
+                picked = ", ".join(f"k AS {name}" for name in columns)
+                opened.execute(f"CREATE VIEW {table} AS {endless} SELECT {picked} FROM n")
+        return path.read_bytes()
 
 
 ODD: tuple[Any, ...] = (

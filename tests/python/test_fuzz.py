@@ -26,6 +26,7 @@ CASES = {
     "poses": 400,
     "scene": 400,
     "forces": 500,
+    "journal": 150,
 }
 
 

@@ -9,6 +9,7 @@ import sys
 import textwrap
 import time
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -132,6 +133,22 @@ class TestEvaluations:
                 u[0] = 600.0
                 assert not problem.evaluate(u)[0]
                 assert (kept.made, len(kept)) == (1, 0)
+
+    @pytest.mark.parametrize("column", ["residuals", "jacobian"])
+    def test_a_damaged_value_is_made_again(self, column: str, path: Path) -> None:
+        """One bit of a number: SQLite does not see it, and the fit went on with it."""
+        for turn, made in enumerate((1, 1, 0)):
+            with Journal(path) as kept:
+                problem = problem_of(swinging())
+                u = problem.parameters.initial()
+                _, r, J = problem.evaluate(u)
+                assert kept.made == made and not kept.trouble
+                assert r.tobytes() + J.tobytes() == b"".join(a.tobytes() for a in problem.core.evaluate(u)[1:])
+            if turn == 0:
+                with closing(sqlite3.connect(path, isolation_level=None)) as opened:
+                    (value,) = opened.execute(f"SELECT {column} FROM evaluation").fetchone()
+                    damaged = value[:30] + bytes([value[30] ^ 1]) + value[31:]
+                    opened.execute(f"UPDATE evaluation SET {column} = ?", (damaged,))
 
     def test_other_problems_have_other_keys(self, path: Path) -> None:
         with Journal(path) as kept:
@@ -335,6 +352,17 @@ class TestRefusals:
         with pytest.raises(sb.InputError, match="cannot be used"):
             Journal(path)
         assert path.read_text() == "notes " * 1000
+
+    def test_what_has_other_tables(self, path: Path) -> None:
+        """A view without an end took all of the time that there is."""
+        Journal(path).close()
+        endless = (
+            "WITH RECURSIVE n(k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n) SELECT k AS key, k AS jacobian FROM n"
+        )
+        with closing(sqlite3.connect(path)) as opened:
+            opened.executescript(f"DROP TABLE evaluation; CREATE VIEW evaluation AS {endless} FROM n")
+        with pytest.raises(sb.InputError, match="cannot be used: it has other tables than a journal"):
+            Journal(path)
 
     def test_a_journal_in_use(self, path: Path) -> None:
         code = f"from sheetbend.minimum.journal import Journal; Journal({str(path)!r})"

@@ -33,11 +33,11 @@ def minimum(*experiments: sb.Experiment, names: tuple[str, ...] = tuple(TRUE)) -
     return problem, minimize(problem, problem.parameters.initial())[0].u
 
 
-def timed(factor: float = 1.0, late: float = 0.0) -> sb.Experiment:
-    """A recording whose times are told wrong."""
+def timed(factor: float = 1.0, late: float = 0.0, first: int = 1) -> sb.Experiment:
+    """A recording whose times are told wrong, from its `first` frame on where they are late."""
     e = fall(rope())
     if late:
-        x = sb.simulate(rope(), np.concatenate([[0.0], TIMES[1:] + late]), SOLVER).positions[:, AT]
+        x = sb.simulate(rope(), np.concatenate([TIMES[:first], TIMES[first:] + late]), SOLVER).positions[:, AT]
         x = x + SIGMA * np.random.default_rng(0).standard_normal(x.shape)
         return replace(e, recording=replace(e.recording, positions=x))
     return replace(e, recording=replace(e.recording, times=factor * TIMES))
@@ -65,6 +65,8 @@ CASES: dict[str, tuple[Any, str]] = {
     "clamp": (lambda: moved((0.0, 0.0, 0.002)), "stood 2 mm farther along z"),
     "scale": (lambda: moved((0.0, 0.0, 0.0), 1.01), "the recording were 0.99 % too large"),
     "late": (lambda: timed(late=0.0025), "the motion had begun 2.5 ms earlier"),
+    "lost": (lambda: timed(late=0.02, first=60), "fall had lost 2 of its frames before 0.6 s"),
+    "twice": (lambda: timed(late=-0.01, first=40), "fall had twice 1 of its frames before 0.4 s"),
     "clock": (lambda: timed(1.003), "the times of the recording were 0.3 % too long"),
     "places": (lambda: placed(-0.003), "all markers sat 3 mm farther along the material"),
     "place": (lambda: placed(0.005, 1), "marker m1 sat 5 mm less far along the material"),

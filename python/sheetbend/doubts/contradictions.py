@@ -78,13 +78,15 @@ def between_parts(
 
     Args:
         refinement: of the discretization; where parts differ, one simulation each tells what it explains of that.
+            Where it widens an interval more than noise does, they differ for that reason alone, and it is asked first.
     """
-    words = _between(problem, u, judged, [])
-    if not words:
+    coarse = refinement is not None and any(e.discretization > (e.statistical or 0.0) for e in judged.estimates)
+    words = {} if coarse else _between(problem, u, judged, [])
+    if not (coarse or words):
         return {}
     shifts = residual_shifts(problem, u, refinement) if refinement is not None else []
     errors = driven_errors(problem, u)
-    return _between(problem, u, judged, shifts, errors) if shifts or errors.size else words
+    return _between(problem, u, judged, shifts, errors) if coarse or shifts or errors.size else words
 
 
 def _between(

@@ -65,7 +65,8 @@ def premises(problem: FitProblem, u: Array, given: Mapping[str, float], told: Se
         u: (free,) the minimum in internal coordinates.
         given: standard deviations by name: of quantities that must be positive relative to the value, of others in
             their unit; "gravity" (each of two directions), "clamp_direction" and "collider_direction" (each
-            axis) in rad, "clamps" (each axis) and "markers" (each marker) in m.
+            axis) in rad, "clamps" (each axis), "markers" (each marker) and "drive_place" (each axis) in m; others of
+            `told.GROUPS`.
         told: `told_numbers` there.
     """
     errors: dict[str, _Errors] = {}

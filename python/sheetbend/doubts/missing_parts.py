@@ -16,6 +16,7 @@ from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
 from .losses_at_zero import losses_at_zero, with_losses
+from .marker_mass import marker_load
 from .tangents import Part, tangents
 from .told import Told
 
@@ -57,10 +58,7 @@ def _parts(e: Experiment, inputs: Array) -> Iterator[Part]:
 
 
 def _masses(e: Experiment, held: Array) -> Iterator[Part]:
-    load = np.zeros(len(held))
-    for place in e.compared_places:
-        np.add.at(load, list(place.particles), place.weights)
-    load[held] = 0.0
+    load = marker_load(e)
     if (load > 0.0).any():
         at = np.flatnonzero(load > 0.0)
         yield "markers' mass", ("mass", at, load[at]), lambda size: f"each marker weighed {short(1e3 * size, 2)} g"

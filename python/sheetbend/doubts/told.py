@@ -24,6 +24,7 @@ from ..objects.markers import Place
 from ..quantities.quantities import Quantity
 from ..quantities.wording import short
 from ..recording.recording import Recording
+from .marker_mass import MOST_EACH, marker_load, unseen_mass
 from .tangents import Input, tangents
 
 Rows = slice | NDArray[np.bool_]
@@ -37,10 +38,19 @@ GROUPS: Mapping[str, tuple[str, tuple[float, str]]] = {
     "clamp_direction": ("rad", STEPS["rad"]),
     "collider_direction": ("rad", STEPS["rad"]),
     "markers": ("m", (MILLIMETER, "1 mm each")),
+    "gravity_size": ("", (3e-3, "0.3 %")),  # what it differs by on Earth
+    "recording_clock": ("", (1e-3, "0.1 %")),
+    "recording_delay": ("s", STEPS["s"]),
+    "recording_size": ("", (5e-3, "0.5 %")),
+    "drive_size": ("", (0.01, "1 %")),
+    "drive_place": ("m", STEPS["m"]),
+    "marker_mass": ("kg", (MOST_EACH, f"{short(1e3 * MOST_EACH)} g each")),
 }
-"""Told numbers that are no quantities, by the name under which a standard deviation is given: unit and step."""
+"""Told numbers that are no quantities, by the name under which a standard deviation is given: unit (none of what is
+relative) and step."""
 SIZE, LATER, SLOWER, LARGER = "size of gravity", "frames later", "clock", "size of the recording"
 FARTHER, ASIDE = "path of what drives the scene", "place of what drives the scene"
+WEIGHTS = "mass of each marker"
 _NONE = np.zeros(0)
 
 
@@ -50,7 +60,7 @@ class Told:
 
     Attributes:
         experiment: its place among those of the problem.
-        name: under which a standard deviation is given; "" for what has none (clocks, the size of gravity).
+        name: under which a standard deviation is given; "" for what has none (such as what the model lacks).
         label: of this error, such as "gravity toward x".
         unit: of the number.
         step: the error whose effect a report tells, and that in words.
@@ -120,17 +130,20 @@ def _collect(
         made.append((weight, Told(i, name, name, q.unit, step[1:], _NONE, value=value, relative=step[0])))
         asked.append((name, k, log))
     made += [(1.0, Told(i, "gravity", name, "rad", STEPS["rad"], _NONE)) for name in names]
-    made += [(1.0, Told(i, "", SIZE, "m/s^2", (0.01, "1 %"), _NONE, relative=True)) for _ in size]
+    made += [(1.0, Told(i, "gravity_size", SIZE, *GROUPS["gravity_size"], _NONE, relative=True)) for _ in size]
     turns = _turns(e)
     made += [
         (1.0, Told(i, "collider_direction", at, "rad", STEPS["rad"], _NONE, missing=_turned(at), signed=True))
         for at in turns
     ]
-    path = _path(e, e.scene.compiled.inputs(theta[slots[i]]))
-    made += [(1.0, Told(i, "", FARTHER, "m", (0.01, "1 %"), _NONE, relative=True)) for _ in path]
+    inputs = e.scene.compiled.inputs(theta[slots[i]])
+    path, weights = _path(e, inputs), _weights(e, inputs)
+    made += [(1.0, Told(i, "drive_size", FARTHER, *GROUPS["drive_size"], _NONE, relative=True)) for _ in path]
+    made += [(1.0, Told(i, "marker_mass", label, "kg", step, _NONE)) for label, (step, _) in weights.items()]
     by_gravity: dict[int, Array] = {}
     if made:
-        columns = tangents(problem, u, i, names | size | turns | path, asked, corrected)
+        loads = {label: load for label, (_, load) in weights.items()}
+        columns = tangents(problem, u, i, names | size | turns | path | loads, asked, corrected)
         for (weight, one), column in zip(made, columns.T, strict=True):
             yield replace(one, column=weight * column)
         by_gravity = {axis: columns[:, len(asked) + n] for n, axis in enumerate(toward)}
@@ -169,6 +182,14 @@ def _path(e: Experiment, inputs: Array) -> dict[str, Input]:
     knots = inputs[first : first + size].reshape(len(e.scene.boundary.times), -1)
     moved = (knots - knots[0]).ravel()
     return {FARTHER: ("boundary", np.flatnonzero(moved), moved[moved != 0.0])} if moved.any() else {}
+
+
+def _weights(e: Experiment, inputs: Array) -> dict[str, tuple[tuple[float, str], Input]]:
+    """What each marker may weigh without a mass in the model, and where that hangs."""
+    first, size = e.scene.compiled.layout["mass"]
+    each, load = unseen_mass(e, inputs[first : first + size]), marker_load(e)
+    at = np.flatnonzero(load)
+    return {WEIGHTS: ((each, f"{short(1e3 * each, 2)} g each"), ("mass", at, load[at]))} if each > 0.0 else {}
 
 
 def _turned(label: str) -> Callable[[float], str]:
@@ -213,11 +234,10 @@ def _observe(
     left = (shown - r.positions)[frames, seen][:, axes] / e.sigma
     own = slice(0, len(marker))  # the rows of the markers; forces do not depend on where these are taken to sit
 
-    def change(label: str, name: str, by: Array, unit: str = "", **more: Any) -> Told:
+    def change(label: str, name: str, by: Array, **more: Any) -> Told:
         """By the markers' (frames, markers, 3) m."""
         rows = _of_loss(e, left, by[frames, seen][:, axes] / e.sigma).ravel()
-        unit, step = GROUPS[name] if name else (unit, STEPS.get(unit, (0.01, "1 %")))
-        return Told(i, name, label, unit, step, rows, **({"rows": own} | more))
+        return Told(i, name, label, *GROUPS[name], rows, **({"rows": own} | more))
 
     for k in range(count):
         whole = change("markers", "markers", moves[k])
@@ -229,18 +249,18 @@ def _observe(
     held, boundary = sorted(e.scene.pinned, key=e.scene.places_of), e.scene.boundary
     if not e.static and e.time_offset is None and len(r.times) > 1 and not boundary.following:
         speed = np.gradient(shown, r.times, axis=0)
-        yield change(LATER, "", speed, "s")
-        yield change(SLOWER, "", speed * (r.times - e.t0)[:, None, None], relative=True)
+        yield change(LATER, "recording_delay", speed)
+        yield change(SLOWER, "recording_clock", speed * (r.times - e.t0)[:, None, None], relative=True)
     aside = [(AXES[a], np.broadcast_to(np.eye(3)[a], shown.shape)) for a in range(3) if a in axes]
     if boundary.driven and not e.scene.contacts.contacts:  # a table would have to move as well
         for way, moved in aside:
-            yield change(f"{ASIDE} {way}", "", moved, "m")
+            yield change(f"{ASIDE} {way}", "drive_place", moved)
     if not held or boundary.driven:  # what is driven goes where it was measured
         return
     for way, moved in aside:
         yield change(f"clamps along {way}", "clamps", moved)
     arm = shown - start[held].mean(axis=0)
-    yield change(LARGER, "", arm, relative=True)
+    yield change(LARGER, "recording_size", arm, relative=True)
     if len(e.scene.air.triangles) or len(e.scene.forces.particles):
         return  # which would have to turn as well
     # To turn the clamps is to turn everything, with the gravity turned back.

@@ -37,6 +37,7 @@ from .held_losses import held_names
 from .lacking import Lacking
 from .losses_at_zero import is_loss
 from .losses_beside_contacts import lost_beside_contacts
+from .lost_frames import lost_frames
 from .other_losses import LEAVES
 from .told import ASIDE, FARTHER, LARGER, LATER, SLOWER, Told, told_numbers
 from .told_words import words_of
@@ -156,7 +157,8 @@ def _asked(
         if not left > 0.0:
             continue
         much, allowed = left > LEAVES * data, max(float(r[mine] @ r[mine]) - left, float(np.count_nonzero(mine)))
-        tried = list(_directions(problem, [*told, *(lacking.of(group) if much else [])], group))
+        more = [*lacking.of(group), *lost_frames(problem, q, r, told)] if much else []
+        tried = list(_directions(problem, [*told, *more], group))
         asked, sure = likely(tried, mine, left, MOST), True
         if asked and not much and (parts := lacking.beside_contacts(group)):
             asked = likely([*tried, *_directions(problem, parts, group)], mine, left, MOST) or asked
@@ -199,6 +201,7 @@ def _directions(
     """The errors that motions may share, or that one of them may have: (rows,) what each changes. Of given losses only
     some."""
     rows, first, others = problem.core.rows, problem.core.first_rows, set(held_names(problem)) - set(losses)
+    others |= {"marker_mass"}  # which is asked among what the model lacks
     within = [one for one in told if one.experiment in group and one.name not in others]
     apart = len(within) * rows <= LONGEST
     each: dict[str, tuple[Told, Array]] = {}

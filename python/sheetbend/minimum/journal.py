@@ -37,12 +37,12 @@ SHARE, GRACE = 0.02, 0.05  # of the time of evaluations, and s, that writing may
 LARGEST_JACOBIAN = 64e6  # bytes; a larger one is made again
 ROOM = 1e9  # bytes, of all values; when it is full no more Jacobians are kept, and no more residuals at twice as much
 RESERVE = 30e6  # bytes of the disk that are left to the results
-TABLES = """
-CREATE TABLE IF NOT EXISTS about (part TEXT, label TEXT, text TEXT NOT NULL, PRIMARY KEY (part, label));
-CREATE TABLE IF NOT EXISTS evaluation (
-  key BLOB PRIMARY KEY, residuals BLOB NOT NULL, seconds REAL, jacobian BLOB, jacobian_seconds REAL, state BLOB
-);
-"""
+SEAL = 8  # bytes of the digest behind every value: SQLite does not see damage inside of one
+TABLES = (
+    "about (part TEXT, label TEXT, text TEXT NOT NULL, PRIMARY KEY (part, label))",
+    "evaluation (key BLOB PRIMARY KEY, residuals BLOB NOT NULL, seconds REAL, jacobian BLOB, jacobian_seconds REAL, "
+    "state BLOB)",
+)
 
 Evaluation = tuple[bool, np.ndarray, np.ndarray]  # ok, residuals (rows,), Jacobian (rows, free) or (0, free)
 Timed = tuple[Evaluation, float | None]  # with the seconds that it took when it was made, where they are known
@@ -93,9 +93,13 @@ class Journal(AbstractContextManager["Journal"]):
             try:
                 # Exclusive: a second process is refused, and no memory is shared, which network disks cannot do.
                 self._db.executescript(
-                    "PRAGMA locking_mode = EXCLUSIVE; PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;" + TABLES
+                    "PRAGMA trusted_schema = OFF; PRAGMA locking_mode = EXCLUSIVE; PRAGMA journal_mode = WAL; "
+                    "PRAGMA synchronous = NORMAL;" + "".join(f"CREATE TABLE IF NOT EXISTS {t};" for t in TABLES)
                 )
                 self._db.execute("BEGIN IMMEDIATE")
+                made = self._db.execute("SELECT sql FROM sqlite_master WHERE sql IS NOT NULL ORDER BY sql").fetchall()
+                if made != [(f"CREATE TABLE {t}",) for t in TABLES]:
+                    raise sqlite3.DatabaseError("it has other tables than a journal")
                 self._expect("fit", {**content.of_software(), **(about or {})})
                 kept = self._db.execute("SELECT key, jacobian IS NOT NULL FROM evaluation").fetchall()
                 sizes = "coalesce(sum(length(residuals) + length(state) + coalesce(length(jacobian), 0)), 0)"
@@ -199,15 +203,21 @@ class Journal(AbstractContextManager["Journal"]):
             except sqlite3.Error as error:
                 self._stop(error)
                 return None
-        residuals = np.frombuffer(row[0]).copy()
-        J = _unpacked(row[1], len(residuals), free) if jacobian else np.zeros((0, free))
-        return (True, residuals, J), row[2], row[3]
+        try:
+            r, packed, seconds, state = row
+            residuals = np.frombuffer(_opened(key, r)).copy()
+            J = _unpacked(_opened(key, packed), len(residuals), free) if jacobian else np.zeros((0, free))
+            return (True, residuals, J), None if seconds is None else float(seconds), _opened(key, state)
+        except (TypeError, ValueError):  # damaged: it is made again
+            self._known.pop(key)
+            return None
 
     def _keep(self, key: bytes, found: Evaluation, jacobian: bool, seconds: float, state: bytes) -> None:
-        residuals = found[1].tobytes()
-        packed = _packed(found[2]) if jacobian else None
+        residuals = _sealed(key, found[1].tobytes())
+        packed = _sealed(key, _packed(found[2])) if jacobian else None
         if packed is not None and (len(packed) > LARGEST_JACOBIAN or self._size + len(packed) > ROOM):
             packed = None
+        state = _sealed(key, state)
         more = len(packed or b"") + (0 if key in self._known else len(residuals) + len(state))
         if (key in self._known and packed is None) or self._size + more > 2 * ROOM:
             return
@@ -226,7 +236,7 @@ class Journal(AbstractContextManager["Journal"]):
                 else:
                     took = (None, seconds) if jacobian else (seconds, None)
                     row = (key, residuals, took[0], packed, took[1], state)
-                    self._db.execute("INSERT INTO evaluation VALUES (?, ?, ?, ?, ?, ?)", row)
+                    self._db.execute("INSERT OR REPLACE INTO evaluation VALUES (?, ?, ?, ?, ?, ?)", row)
                 self._size += more
                 self._known[key] = packed is not None
                 if time.monotonic() - self._committed >= COMMIT_SECONDS:
@@ -347,6 +357,23 @@ def remove(path: Path) -> None:
     """Remove a journal, and what SQLite may have left beside it after a kill."""
     for end in ("", "-wal", "-shm"):
         path.with_name(path.name + end).unlink(missing_ok=True)
+
+
+def _sealed(key: bytes, value: bytes) -> bytes:
+    """A value with a digest of it behind."""
+    return value + hashlib.blake2b(value, key=key, digest_size=SEAL).digest()
+
+
+def _opened(key: bytes, sealed: bytes) -> bytes:
+    """The value.
+
+    Raises:
+        ValueError, TypeError: it was changed.
+    """
+    value = bytes(sealed[:-SEAL])
+    if _sealed(key, value) != sealed:
+        raise ValueError("is damaged")
+    return value
 
 
 def _packed(jacobian: np.ndarray) -> bytes:

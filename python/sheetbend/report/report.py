@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from ..optional import require
@@ -20,7 +21,7 @@ from .report_profiles import lopsided_profiles
 from .report_recordings import forces, held_out_motion, recordings
 from .report_shot import shot_motions
 from .report_starts import groups_of_starts, starts_note
-from .resting import rests
+from .resting import PLAUSIBLE, Rests, rests
 from .tables import Section, plain_section, rich_section, wide
 
 if TYPE_CHECKING:
@@ -32,7 +33,8 @@ CORRELATIONS_SHOWN = 15
 """Number of correlations that the report lists at most; fit.json has them all."""
 GROWTH_SHOWN = 10.0
 """Growth of small displacements from which on the report tells it."""
-IF_RIGHT = "if right to"  # how well given values must be known for an interval to hold
+IN_ALL = "+/- in all"  # the half-width with errors of given values
+FELT = 1.1  # half-widths: where errors of given values make them no wider, the report leaves them out
 _SHAKEN = 0.1  # of a half-width: less adds next to nothing to it
 
 
@@ -136,14 +138,31 @@ def _parameters(result: FitData) -> Section:
     rows += [_given_row(given) for given in result.given]
     headers: tuple[str, ...] = ("parameter", "value", "+/-", "95 % interval", "unit", "verdict")
     notes = [("intervals", words) for words in result.not_counted]
-    if on := rests(result):
-        beside = [(*row, on[row[0]].cell if row[0] in on else "") for row in rows]
-        if wide(((*headers, IF_RIGHT), *beside)):
-            shared = [name for name in on if not name.endswith("]")] or list(on)
-            notes.insert(0, ("verdicts hold if", "; ".join(f"{name}: {on[name].note}" for name in shared)))
+    in_all = {e.name: _in_all(e) for e in result.estimates if e.in_all and e.in_all > FELT * (e.half_width or math.inf)}
+    if in_all:
+        beside = [(*row, in_all.get(row[0], "")) for row in rows]
+        words = f"if given values, which intervals take as exact, are off by {PLAUSIBLE}, unseen in the residuals"
+        if wide(((*headers, IN_ALL), *beside)):
+            shared = [name for name in in_all if not name.endswith("]")] or list(in_all)
+            words = f"{', '.join(f'{name} {in_all[name]}' for name in shared)}, {words}"
         else:
-            headers, rows = (*headers, IF_RIGHT), beside
+            headers, rows = (*headers, IN_ALL), beside
+        notes.insert(0, (IN_ALL, f"{words}{_most(rests(result))}"))
     return Section("Parameters", headers, tuple(rows), tuple(notes))
+
+
+def _most(found: Mapping[str, Rests]) -> str:
+    """Which given values count the most, for which parameters."""
+    of: dict[str, list[str]] = {}
+    for name, on in found.items():
+        of.setdefault(on.name, []).append(name)
+    most = ", ".join(f"{given} ({', '.join(names)})" for given, names in of.items())
+    return f". The most is {most}" if most else ""
+
+
+def _in_all(estimate: Estimate) -> str:
+    """Half-width with errors of given values, to the digits of the value's row."""
+    return figures((estimate.value, estimate.in_all), estimate.in_all)[1]
 
 
 def _estimate_row(estimate: Estimate) -> tuple[str, ...]:

@@ -1,7 +1,8 @@
-"""Which given number, wrong by as much as it may well be, would move an estimate out of its interval without a trace.
+"""What given numbers that are wrong by as much as they may well be would do to an estimate without a trace.
 
 An error that leaves much in the residuals is named (doubts.wrong_given). So an error counts here up to the size from
-which on it would be.
+which on it would be. Intervals take given numbers as exact. So the report shows a second half-width, in which these
+errors count as independent of each other.
 """
 
 from __future__ import annotations
@@ -14,9 +15,11 @@ from ..quantities.wording import short
 from ..result.estimate import Estimate, Premise
 from ..result.result import FitData
 
+PLAUSIBLE = "1 %, 1 mm, 1 ms or 0.25 degrees"
+"""Of most given numbers, the error that may well be; of clocks and sizes it is less (`doubts.told.GROUPS`)."""
 LEVEL = 0.25
 """Degrees by which a direction may well be wrong: what a spirit level or an eye along an edge leaves. Other numbers may
-be wrong by the error whose effect the report tells: 1 %, 1 mm, 1 ms."""
+be wrong by the error whose effect the report tells."""
 STANDS = ("identified", "weak")
 NAMED = 0.85 / 0.15
 """An error is named where it leaves so many times what else the fit leaves beyond noise (doubts.causes.MOST)."""
@@ -38,24 +41,10 @@ class Rests:
     others: int
 
     @property
-    def cell(self) -> str:
-        """In a table."""
-        return f"{self.name} {self.size}{self._more}"
-
-    @property
-    def note(self) -> str:
-        """Below a table."""
-        return f"the error in {self.name} is below {self.size}{self._more}"
-
-    @property
     def words(self) -> str:
         """Behind a verdict."""
         more = f" and {self.others} other given value{'s are' if self.others > 1 else ' is'} right too"
         return f"if the error in {self.name} is below {self.size}{more if self.others else ''}"
-
-    @property
-    def _more(self) -> str:
-        return f", {self.others} more" if self.others else ""
 
 
 def rests(result: FitData) -> dict[str, Rests]:
@@ -79,21 +68,35 @@ def needed(result: FitData) -> dict[str, str]:
 
 
 def told_to_rest(result: FitData) -> tuple[Estimate, ...]:
-    """The estimates, each with what it rests on in its words."""
+    """The estimates, each with what it rests on in its words, and with its half-width in all."""
     found = rests(result)
     return tuple(
-        replace(e, words=f"{e.words}, {found[e.name].words}") if e.name in found else e for e in result.estimates
+        replace(
+            e,
+            words=f"{e.words}, {found[e.name].words}" if e.name in found else e.words,
+            in_all=math.hypot(e.half_width, *(may for may, *_ in _may_move(result, e)))
+            if e.half_width and e.verdict in STANDS and result.premises
+            else None,
+        )
+        for e in result.estimates
     )
 
 
 def _far(result: FitData, e: Estimate) -> Iterator[tuple[float, float, Premise]]:
-    """By how much each given number may move an estimate that stands, of those that may move it by more than its
-    half-width, and the error of it that moves it by just that."""
+    """By how much each given number may move an estimate, of those that may move it by more than its half-width, and
+    the error of it that moves it by just that."""
+    for may, moves, p in _may_move(result, e):
+        if e.half_width and may > e.half_width:
+            yield may, e.half_width / moves, p
+
+
+def _may_move(result: FitData, e: Estimate) -> Iterator[tuple[float, float, Premise]]:
+    """By how much each given number without a standard deviation may move an estimate that stands, and by how much an
+    error of one unit of it does."""
     for p in result.premises if e.verdict in STANDS else ():
         moves = abs(p.moved.get(e.name, 0.0)) / p.off_by
-        may = moves * min(_plausible(p), _unseen(result, p))
-        if p.sd is None and e.half_width and may > e.half_width:
-            yield may, e.half_width / moves, p
+        if p.sd is None:
+            yield moves * min(_plausible(p), _unseen(result, p)), moves, p
 
 
 def _plausible(premise: Premise) -> float:
@@ -110,10 +113,14 @@ def _unseen(result: FitData, premise: Premise) -> float:
 
 
 def _size(premise: Premise, error: float) -> str:
-    if premise.words == "1 %" and premise.value is not None:
-        return f"{short(100 * error / abs(premise.value), 2)} %"
+    if premise.words.endswith(" %"):
+        return f"{short(error / premise.off_by * float(premise.words.removesuffix(' %')), 2)} %"
     if premise.unit == "rad":
         return f"{short(math.degrees(error), 2)} degrees"
+    if premise.unit == "s":
+        return f"{short(1e3 * error, 2)} ms"
+    if premise.unit == "kg" and premise.name == "mass of each marker":
+        return f"{short(1e3 * error, 2)} g each"
     if premise.unit == "m":
         return f"{short(1e3 * error, 2)} mm{' each' if premise.name == 'markers' else ''}"
     return f"{short(error, 2)} {premise.unit}".rstrip()

@@ -85,7 +85,6 @@ def flush_left(section: Section) -> list[bool]:
         "recording",
         "unit",
         "verdict",
-        "if right to",
         "step",
         "stays",
         "rope",

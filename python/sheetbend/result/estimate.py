@@ -36,6 +36,8 @@ class Estimate:
         words: the verdict as a sentence.
         moved: how far the value was moved to the limit of short substeps and fine meshes, in `unit`; it is contained in
             `value`.
+        in_all: half-width if given numbers are off, too, by what they may well be and residuals do not show; None where
+            that was not measured, or where no verdict stands.
     """
 
     name: str
@@ -51,6 +53,7 @@ class Estimate:
     systematic: float = 0.0
     moved: float = 0.0
     driven: float = 0.0
+    in_all: float | None = None
 
     def __post_init__(self) -> None:
         if self.verdict not in VERDICTS:
