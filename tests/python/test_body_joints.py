@@ -125,6 +125,38 @@ def test_servo_follows_and_a_torque_turns_body_and_rotor() -> None:
         wheel(torque=([0.0], [1.0]))
 
 
+def gate(g: float, **options: object) -> tuple[sb.Scene, sb.Body]:
+    """A bar that stands out from a hinge with an upright axis."""
+    scene = sb.Scene("gate", gravity=(0.0, 0.0, -g))
+    bar = scene.add_body("bar", of=INERTIA, at=(0.1, 0.0, 0.0))
+    sb.hinge(None, bar, at=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0), **options)  # type: ignore[arg-type]
+    return scene, bar
+
+
+def test_an_axis_that_gives_way_sags_and_swings_like_a_torsion_spring() -> None:
+    """At rest k sin(tilt) = m g l. A small swing is that of a damped oscillator, released without load."""
+    k, c, weight = 5.0, 0.02, 0.3 * 9.81
+    scene, bar = gate(9.81, tilt_stiffness=k)
+    assert bar.pose(sb.equilibrium(scene).nodes)[0][2] == pytest.approx(-0.1 * weight * 0.1 / k, rel=1e-9)
+    moment = INERTIA.matrix[1, 1] + 0.3 * 0.1**2
+    scene, bar = gate(0.1, tilt_stiffness=k, tilt_damping=c)
+    decay = 0.5 * c / moment
+    w = np.sqrt(k / moment - decay**2)
+    times = np.round(np.array([1.0, 2.0, 3.5]) * np.pi / w, 4)
+    motion = sb.simulate(scene, times, sb.Solver(h=1e-4))
+    free = np.exp(-decay * times) * (np.cos(w * times) + decay / w * np.sin(w * times))
+    sag = 0.1 * 0.3 * 0.1 * 0.1 / k
+    assert bar.pose(motion)[0][:, 2] == pytest.approx(-sag * (1.0 - free), rel=1e-3)
+
+
+@pytest.mark.parametrize("method", ["direct", "implicit"])
+def test_an_axis_that_gives_way_has_exact_gradients(method: str) -> None:
+    scene, _ = gate(9.81, tilt_stiffness=5.0, tilt_damping=0.02)
+    report = sb.check_gradients(scene, [0.01, 0.02], samples=1, solver=sb.Solver(h=1e-3, method=method))
+    assert report.passed, str(report)
+    assert {"hinge_tilt_stiffness", "hinge_tilt_damping"} <= set(scene.quantities)
+
+
 def arms(angles: list[float], solver: sb.Solver, until: float) -> np.ndarray:
     """Angles of the triple pendulum of the oracle, from bodies on hinges."""
     scene, top, upper, bodies = sb.Scene("triple"), np.zeros(3), None, []
@@ -192,3 +224,7 @@ def test_bad_joints_are_refused() -> None:
         sb.ball(other, body, at=(0.0, 0.0, 0.0))
     with pytest.raises(sb.SceneError, match="is no body"):
         sb.ball(None, 3, at=(0.0, 0.0, 0.0))  # type: ignore[arg-type]
+    with pytest.raises(sb.SceneError, match="tilt_damping: acts where the axis gives way, and it is rigid"):
+        gate(9.81, tilt_damping=0.1)
+    with pytest.raises(sb.SceneError, match="tilt_stiffness: must be positive"):
+        gate(9.81, tilt_stiffness=-1.0)

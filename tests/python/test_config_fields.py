@@ -85,6 +85,8 @@ WHOLE: dict[str, Any] = {
                 "limit_stiffness": 10.0,
                 "limit_damping": 0.1,
                 "limit_depth": 0.01,
+                "tilt_stiffness": 30.0,
+                "tilt_damping": 0.01,
             }
         ],
         "collider": [{"name": "table", "shape": "plane"}],

@@ -9,10 +9,11 @@ from pydantic import model_validator
 from .section import Finite, Line, Name, Quaternion, Section, Vector, key
 
 GROUND = "ground"
+TILT = ("tilt_stiffness", "tilt_damping")
 LIMITS = ("limits", "limit_stiffness", "limit_damping", "limit_depth")
 JOINTS: dict[str, tuple[str, ...]] = {
     "ball": ("compliance",),
-    "hinge": ("axis", "rate", "stiffness", "rest", "viscosity", "servo", "torque", "rotor", *LIMITS),
+    "hinge": ("axis", "rate", "stiffness", "rest", "viscosity", "servo", "torque", "rotor", *LIMITS, *TILT),
     "universal": ("axes",),
     "slider": ("axis", "rate", *LIMITS),
     "cylinder": ("axis", "rate", "turn_rate"),
@@ -120,6 +121,15 @@ class JointSection(Section):
     )
     limit_depth: Finite | None = key(
         None, "beyond a limit, over which stiffness and damping grow from zero; 0.02 rad or 0.005 m", "rad or m", gt=0
+    )
+    tilt_stiffness: Finite | None = key(
+        None,
+        "of a hinge whose axis gives way, torque over the angle that it leans: <name>_tilt_stiffness",
+        "N m/rad",
+        gt=0,
+    )
+    tilt_damping: Finite | None = key(
+        None, "of such a hinge, torque over the rate of that angle: <name>_tilt_damping", "N m s/rad", ge=0
     )
     compliance: Finite | None = key(None, "of a ball joint that gives way: <name>_compliance", "m/N", gt=0)
 

@@ -6,8 +6,8 @@ a rope or a cloth in a resolved motion. Where it grows by many orders of magnitu
 along the one direction that grows, and a linear model of the motion holds for no step that an optimizer takes.
 
 A displacement that violates a rigid constraint is projected away within the first substeps, so that a mechanism needs
-no special treatment. Directors have no inertia and are left out, as is what is pinned or driven. Coordinates in which
-nothing moves (the normal of a plane motion) are left out too: a residual never feels what grows there.
+no special treatment. Directors have no inertia and are left out, as is what is pinned or driven. Directions in which
+nothing moves but by rounding (the normal of a plane motion) are left out too: a residual never feels what grows there.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ ROUGH = 1e4
 a real double pendulum over 2 s has 2.4, a cloth whose fit stalls where it starts has 2e18."""
 DIRECTIONS = 8  # as many tangents as one rollout carries
 FRAMES = 100  # at which sigma is taken, at most
+STILL = 1e-9  # of the largest motion along any direction: what is less is rounding
 WINDOWS = 8  # of a motion that is shot in windows, at which growth is looked at
 SEED = 19
 
@@ -176,11 +177,21 @@ def _rollout(scene: Scene, solver: Solver, inputs: Array, steps: Array, t0: floa
     return x.reshape(frames, -1, 3)[:, free], np.moveaxis(moved, 0, -1)
 
 
+def _moving(x: Array) -> Array:
+    """(3, directions) in which particles at positions (frames, free, 3) move by more than rounding; all axes where that
+    are all, or none."""
+    way = (x - x[0]).reshape(-1, 3)
+    size = np.abs(way).max(initial=0.0)
+    if not 0.0 < size < np.inf:
+        return np.eye(3)
+    _, lengths, directions = np.linalg.svd(np.linalg.qr(way / size, mode="r"), full_matrices=False)
+    moving = lengths > STILL * lengths[0]
+    return np.eye(3) if moving.sum() == 3 else np.asarray(directions[moving].T)
+
+
 def _sigma(x: Array, moved: Array) -> Array:
     """(frames,) from positions (frames, free, 3) and displacements (frames, free, 3, directions)."""
-    still = np.ptp(x, axis=0).max(axis=0) == 0.0
-    axes = np.flatnonzero(~still) if not still.all() else np.arange(3)
-    matrices = moved[:, :, axes].reshape(len(moved), -1, DIRECTIONS)
+    matrices = np.einsum("fpad,ab->fpbd", moved, _moving(x)).reshape(len(moved), -1, DIRECTIONS)
     size = np.abs(matrices).max(axis=(1, 2))
     finite = np.isfinite(size) & (size > 0.0)
     sigma = np.where(np.isfinite(size), 0.0, np.inf)

@@ -177,11 +177,14 @@ class Making:
         weights = [*self.upper.coordinates(self.places[0]), *self.lower.coordinates(self.places[1])]
         self.constrain("coincide", "place", [[p, q, *a, *b]], [weights], compliance)
 
-    def across(self, pairs: Sequence[tuple[int, int]]) -> None:
-        """Keep directions of the upper body across directions of the lower one, each by its number in `axes`."""
+    def across(
+        self, pairs: Sequence[tuple[int, int]], compliance: ArrayLike | None = None, damping: ArrayLike | None = None
+    ) -> str:
+        """Keep directions of the upper body across directions of the lower one, each by its number in `axes`; returns
+        the group's name."""
         (_, *a), (_, *b) = self.nodes
         weights = [[*self.direction(0, i), *self.direction(1, j)] for i, j in pairs]
-        self.constrain("across", "turn", [[*a, *b]] * len(pairs), weights)
+        return self.constrain("across", "turn", [[*a, *b]] * len(pairs), weights, compliance, damping)
 
     def along(self) -> None:
         """Keep the lower place on the line through the upper one."""
@@ -210,18 +213,20 @@ class Making:
         return group
 
     def name_stiffness(self, group: str, quantity: str, value: float, unit: str) -> None:
-        """Make a quantity of the stiffness of a group of one constraint, which was given a compliance."""
+        """Make a quantity of the stiffness that all constraints of a group have, which was given a compliance."""
         own, first, _ = self.scene.group(group)
         own.compliance[:] = 0.0
         self.scene.add_quantity(quantity, value, unit)
-        self.scene.add_terms([Term("compliance", first, 1.0, ((quantity, "inverse"),))])
+        places = first + np.arange(len(own.compliance))
+        self.scene.add_terms([Term("compliance", places, 1.0, ((quantity, "inverse"),))])
 
     def name_damping(self, group: str, quantity: str, value: float, unit: str) -> None:
-        """Make a quantity of the damping of a group of one constraint, which was given one of zero."""
-        _, first, _ = self.scene.group(group)
+        """Make a quantity of the damping that all constraints of a group have, which was given one of zero."""
+        own, first, _ = self.scene.group(group)
         limits = None if value > 0.0 else ZERO_OR_MORE
         self.scene.add_quantity(quantity, value, unit, positive=value > 0.0, limits=limits)
-        self.scene.add_terms([Term("damping", first, 1.0, ((quantity, "identity"),))])
+        places = first + np.arange(len(own.damping))
+        self.scene.add_terms([Term("damping", places, 1.0, ((quantity, "identity"),))])
 
 
 def constrain(

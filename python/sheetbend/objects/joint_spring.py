@@ -1,8 +1,9 @@
-"""What turns a hinge or resists it: a torsion spring, viscosity, a servo, or the torque of a motor over time.
+"""What turns a hinge or resists it: a torsion spring, viscosity, a servo, or the torque of a motor over time; and how
+stiffly it holds its axis.
 
-All are the constraint `joint_angle`, whose dial is the x of a hidden node: pinned at zero for a spring, driven for a
-servo. The dial of a motor is free: the rotor, an axis with inertia and no weight, which turns with the joint and on
-which the torque acts.
+All but the last are the constraint `joint_angle`, whose dial is the x of a hidden node: pinned at zero for a spring,
+driven for a servo. The dial of a motor is free: the rotor, an axis with inertia and no weight, which turns with the
+joint and on which the torque acts.
 """
 
 from __future__ import annotations
@@ -66,6 +67,25 @@ def add_motor(made: Making, torque: Knots | None, rotor: float | None) -> None:
         for k, value in enumerate(values):
             quantity = scene.add_quantity(f"{name}_torque_{k}", float(value), "N m", positive=False, scale=size)
             scene.forces.add_term(dial, k, 0, quantity)
+
+
+def hold_axis(made: Making, stiffness: float | None, damping: float | None) -> None:
+    """Keep the lower body's axis of a hinge along the upper one's: rigidly, or with a stiffness against tilts about
+    both directions across it."""
+    if stiffness is None and damping is not None:
+        fix = "add tilt_stiffness, or leave tilt_damping out"
+        raise SceneError(f"{made.name}.tilt_damping", "acts where the axis gives way, and it is rigid", damping, fix)
+    for field, value, least in (("stiffness", stiffness, 0.0), ("damping", damping, -1e-300)):
+        if value is not None and not (is_number(value) and value > least):
+            raise SceneError(f"{made.name}.tilt_{field}", "must be positive", value, "give a positive number, or none")
+    pairs = [(0, 1), (0, 2)]
+    if stiffness is None:
+        made.across(pairs)
+        return
+    group = made.across(pairs, np.ones(2), None if damping is None else np.zeros(2))
+    made.name_stiffness(group, f"{made.name}_tilt_stiffness", stiffness, "N m/rad")
+    if damping is not None:
+        made.name_damping(group, f"{made.name}_tilt_damping", damping, "N m s/rad")
 
 
 def _angle(made: Making, label: str, dial: int, stiffness: float | None, rest: float, viscosity: float | None) -> None:

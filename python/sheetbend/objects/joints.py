@@ -15,7 +15,7 @@ from ..errors import SceneError
 from ..scene.body import Body
 from .joint_limits import add_limits
 from .joint_making import Joint, Making
-from .joint_spring import Knots, add_motor, add_servo, add_spring
+from .joint_spring import Knots, add_motor, add_servo, add_spring, hold_axis
 
 
 def ball(
@@ -58,14 +58,17 @@ def hinge(
     limit_stiffness: float | None = None,
     limit_damping: float | None = None,
     limit_depth: float | None = None,
+    tilt_stiffness: float | None = None,
+    tilt_damping: float | None = None,
 ) -> Joint:
     """Join two bodies by a hinge.
 
     Quantities: its place as of `ball`; `<name>_angle` rad and `<name>_rate` rad/s, the start of the lower body, which
     replace its own place, attitude, velocity and spin; with a spring `<name>_stiffness` N m/rad and `<name>_rest` rad;
     with viscosity `<name>_viscosity` N m s/rad; with limits `<name>_limit_low`, `<name>_limit_high` and
-    `<name>_limit_depth` rad, `<name>_limit_stiffness` N m/rad, and `<name>_limit_damping` N m s/rad where given. The
-    angle counts from how the bodies were given.
+    `<name>_limit_depth` rad, `<name>_limit_stiffness` N m/rad, and `<name>_limit_damping` N m s/rad where given; of an
+    axis that gives way `<name>_tilt_stiffness` N m/rad and `<name>_tilt_damping` N m s/rad where given. The angle
+    counts from how the bodies were given.
 
     Args:
         upper, lower: the bodies; None is the ground.
@@ -87,6 +90,9 @@ def hinge(
         limit_damping: of a stop, torque over rate, N m s/rad.
         limit_depth: rad beyond a limit, over which stiffness and damping grow from zero to these values; 0.02 by
             default.
+        tilt_stiffness: N m/rad, torque over the angle by which the lower body's axis leans against the upper one's.
+            The axis is rigid by default. One that gives way takes up part of an impact.
+        tilt_damping: N m s/rad, torque over the rate of that angle.
 
     Raises:
         SceneError: shapes, NaN, negative numbers, limits that are no range, or bodies that are none or the same.
@@ -94,7 +100,7 @@ def hinge(
     made = Making("hinge", upper, lower, at, axis, name)
     made.hang(turn=rate)
     made.coincide()
-    made.across([(0, 1), (0, 2)])
+    hold_axis(made, tilt_stiffness, tilt_damping)
     if servo is not None:
         add_servo(made, servo, stiffness, rest, viscosity)
     else:
