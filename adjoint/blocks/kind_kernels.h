@@ -7,6 +7,7 @@ namespace sheetbend {
 
 template <class K>
 struct BlockKernels {
+  static constexpr bool hot = K::hot || K::hot_in_blocks;
   static const sheetbend_blocks::KindKernels all;
 };
 

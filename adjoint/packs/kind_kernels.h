@@ -7,6 +7,7 @@ namespace sheetbend {
 
 template <class K>
 struct PackKernels {
+  static constexpr bool hot = K::hot;
   static const sheetbend_packs::KindKernels all;
 };
 

@@ -16,6 +16,7 @@
 // (see yield.h).
 // `unilateral = true` (one row): C >= 0, a constraint that pushes and never pulls. Its multiplier stays lambda >= 0.
 // `hot = true`: its kernels are inlined as a whole, which costs compile time and bytes and pays where the kind decides how long a simulation takes.
+// `hot_in_blocks = true`: the same of its kernels in direct blocks alone.
 // `periodic = true` says that C is an angle: differences of it (rate damping) are taken the short way round.
 //
 // Shortcuts make hot constraints cheaper; a constraint without them works the same, and tests compare the two routes:
@@ -53,7 +54,7 @@ struct OnPoints {
   static constexpr bool periodic = false;
   static constexpr bool unilateral = false;
   static constexpr bool unit_gradients = false;
-  static constexpr bool hot = false;
+  static constexpr bool hot = false, hot_in_blocks = false;
   static constexpr const char* instead_of_rest =
       nullptr;  // what to use where somebody gives values that the kind does not have
 };

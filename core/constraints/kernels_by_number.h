@@ -18,7 +18,7 @@ template <template <class> class Own, class Kernels>
 constexpr auto kernels_by_number([[maybe_unused]] const Kernels* const* of_cold_kinds = nullptr) {
   const auto choose = [&of_cold_kinds]<class K>(K*, [[maybe_unused]] std::size_t kind) -> const Kernels* {
 #ifdef SHEETBEND_COLD_VARIANT
-    if constexpr (!K::hot) return of_cold_kinds[kind];
+    if constexpr (!Own<K>::hot) return of_cold_kinds[kind];
 #endif
     return &Own<K>::all;
   };

@@ -11,6 +11,7 @@ namespace sheetbend {
 struct YieldingCurvature : Yielding<MaterialCurvature> {
   static constexpr const char* name = "yielding_curvature";
   static constexpr const char* about = "material_curvature where a share of the stiffness yields";
+  static constexpr bool hot_in_blocks = true;  // ropes between grips yield
 };
 
 struct SectionYieldingCurvature : Yielding<SectionCurvature> {

@@ -107,12 +107,19 @@ void let_slide(const Scene& scene, const Inputs<const Dual<double, N>>& in, Dual
     const SlidingSpring<K, double> values([&](int d) { return at(d).v; }, own);
     if (!values.slides) return;
 
+    // The yield says when C slides, and is not in it. Of many directions few change what is.
+    bool varies = false;
+    for (int k = 0; k < inside; ++k)
+      for (int i = 0; i < N; ++i) varies |= k != K::yield_parameter && p[k].d[i] != 0.0;
     using ByParameter = Dual<double, inside>;
-    ByParameter xd[K::dofs], pd[P], C[K::rows], J[K::rows * K::dofs];
-    for (int d = 0; d < K::dofs; ++d) xd[d].v = values.x[d];
-    for (int k = 0; k < P; ++k) pd[k].v = own[k];
-    for (int k = 0; k < inside; ++k) pd[k].d[k] = 1.0;
-    Sliding::evaluate(xd, pd, C, J);
+    ByParameter C[K::rows]{};
+    if (varies) {
+      ByParameter xd[K::dofs], pd[P], J[K::rows * K::dofs];
+      for (int d = 0; d < K::dofs; ++d) xd[d].v = values.x[d];
+      for (int k = 0; k < P; ++k) pd[k].v = own[k];
+      for (int k = 0; k < inside; ++k) pd[k].d[k] = 1.0;
+      Sliding::evaluate(xd, pd, C, J);
+    }
     Directed e[K::rows];
     for (int j = 0; j < K::rows; ++j) {
       e[j].v = values.C[j];
