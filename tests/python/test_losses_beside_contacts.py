@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sheetbend as sb
+from sheetbend.doubts.absent_bounce import has_no_bounce, with_bounce
 from sheetbend.doubts.causes import Wrong
 from sheetbend.doubts.losses_at_zero import is_loss
 from sheetbend.doubts.missing_parts import missing_parts
@@ -110,6 +111,25 @@ def test_a_restitution_that_is_missing_is_named() -> None:
     said = other_losses(problem, u)
     assert set(said) == set(NAMES)
     assert "drag bounces where the model comes to rest: with a restitution of 0.33 the fit" in said["rope_EI"]
+
+
+def test_contacts_with_a_stiffness_get_no_restitution() -> None:
+    """The scene refuses it, and that ended the fit of a rope on a soft table, after its work."""
+
+    def onto(*stiffness: float | None) -> sb.Experiment:
+        scene = sb.rope(0.3, 11, density=0.05, EA=200.0, EI=1e-4, start=(0, 0, 0.006), pinned=())
+        for k, each in enumerate(stiffness):
+            plane = sb.Plane((0, 0, -k), name=f"table {k}")
+            scene.contact(scene.ropes["rope"], plane, friction=0.3, radius=0.005, stiffness=each)
+        return seen(scene, scene, 0)
+
+    assert not has_no_bounce(onto(2e4))
+    mixed = onto(2e4, None)
+    assert has_no_bounce(mixed)
+    problem = FitProblem([mixed], as_parameters(["rope_EI"], [mixed]))
+    (bouncing,) = with_bounce(problem, 0.5).experiments
+    assert [c.bounces for c in bouncing.scene.contacts.contacts] == [False, True]
+    assert bouncing.scene.compiled.inputs()[bouncing.scene.compiled.layout["restitution"][0]] == 0.5
 
 
 def drawn(warp: float, friction: float, damping: float | None = None) -> tuple[sb.Scene, sb.Cloth]:

@@ -8,7 +8,7 @@ from ..arrays.timeseries import Array
 from ..experiment.experiment import Experiment
 
 MOST_EACH = 1e-4  # kg each: a small ball or a piece of tape
-SHARE = 0.01  # of what carries them, all together
+SHARE = 0.005  # of what carries them, all together
 
 
 def marker_load(e: Experiment) -> Array:
