@@ -19,7 +19,7 @@ LAYERS = (
     ("jax", "minimum", "report", "torch"),
     ("doubts", "textile"),
     ("fitting", "pictures"),
-    ("gripped", "page", "plot"),
+    ("gripped", "page", "pesto", "plot"),
     ("", "config"),
     ("cli",),
 )

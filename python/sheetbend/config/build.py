@@ -74,9 +74,14 @@ class Study:
 
     @property
     def _refinement(self) -> Refinement:
-        """Whatever has a mesh can be made finer."""
+        """Whatever has a mesh can be made finer, but for a cloth whose stiffness varies: the modes are those of its
+        triangles."""
         fit, scene = self.config.fit, self.config.scene
-        meshed = fit.double_segments is not False and bool(scene.strands or scene.cloth)
+        varied = any(cloth.stiffness_modes for cloth in scene.cloth)
+        if varied and fit.double_segments:
+            fix = "leave it out: the mesh then does not count, and the report says so"
+            raise ConfigError("fit.double_segments", "does not go with stiffness_modes of a cloth", True, fix)
+        meshed = fit.double_segments is not False and bool(scene.strands or scene.cloth) and not varied
         finer = (lambda: build(self.config, self.folder, finer=2).experiments) if meshed else None
         return Refinement(halve_step=fit.halve_step, finer=finer, linear=fit.linear_refits or not fit.double_segments)
 

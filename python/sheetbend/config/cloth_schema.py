@@ -216,6 +216,12 @@ class Cloth(Section):
         le=1.25,
     )
     weft_size: Finite | None = key(None, "the same along the weft", ge=0.8, le=1.25)
+    stiffness_modes: int = key(
+        0,
+        "by how many smooth modes the logarithm of the membrane's stiffness varies from triangle to triangle; "
+        "quantities NAME_stiffness_1, ..., the smoothest first. [smooth.NAME_stiffness] fits them",
+        ge=0,
+    )
     air_normal: Finite | None = key(
         None, "force of air along the normal of the triangles, air density * drag coefficient / 2", "kg/m^3", gt=0
     )

@@ -226,7 +226,8 @@ class GivenSection(Section):
 
 class SmoothSection(Section):
     """A field of stiffness that is fitted with a smoothness prior. One table each: [smooth.NAME], NAME being
-    "<solid>_stiffness" of a solid with clusters and `stiffness_modes`, whose modes are then parameters."""
+    "<solid>_stiffness" of a solid with clusters and `stiffness_modes`, or "<cloth>_stiffness" of a cloth with them. The
+    modes are then parameters."""
 
     size: Finite | None = key(
         None, "root mean square of ln E about its mean; found from the recordings when left out", gt=0

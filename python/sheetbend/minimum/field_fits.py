@@ -1,6 +1,6 @@
-"""The stiffness of each cluster of a field, and its interval, at the end of a fit.
+"""The stiffness of each place of a field, and its interval, at the end of a fit.
 
-In the linear picture ln E of a cluster has a normal distribution under a prior of a given size and length. Where these
+In the linear picture ln E of a place has a normal distribution under a prior of a given size and length. Where these
 were found from the recordings, it is a mixture over all sizes and lengths that are possible, weighted by their marginal
 likelihood. The interval about the estimate holds 95 % of the mixture.
 """
@@ -47,13 +47,15 @@ def field_fits(problem: FitProblem, u: Array, fields: Sequence[Field]) -> tuple[
                 stiffness=tuple(E.tolist()),
                 half_widths=tuple(half.tolist()),
                 left=tuple(left.tolist()),
+                unit=modes.unit,
+                place=modes.place,
             )
         )
     return tuple(found)
 
 
 def spread(picture: Picture, fields: Sequence[Field], i: int, level: int | None) -> tuple[Array, Array]:
-    """Half-widths of ln E (clusters,) of one field, and the shares of the prior's variance that the data leave.
+    """Half-widths of ln E (places,) of one field, and the shares of the prior's variance that the data leave.
 
     The priors of other fields are taken as exact.
 
@@ -67,12 +69,13 @@ def spread(picture: Picture, fields: Sequence[Field], i: int, level: int | None)
     for one, weight in zip(each, weights, strict=True):
         step, root = picture.solved([*fields[:i], one, *fields[i + 1 :]])
         shift, about = modes.shapes @ (step - at_minimum)[own], modes.shapes @ root[own]
-        prior = np.sum((modes.shapes * modes.deviations(one.size, one.length)) ** 2, axis=1)
-        left += weight * np.sum(about**2, axis=1) / np.maximum(prior, 1e-300)
+        unknown = modes.left_out(one.size, one.length)
+        prior = np.sum((modes.shapes * modes.deviations(one.size, one.length)) ** 2, axis=1) + unknown
+        left += weight * (np.sum(about**2, axis=1) + unknown) / np.maximum(prior, 1e-300)
         if level is not None:
             shift, about = shift + (step - at_minimum)[level], about + root[level]
         shifts.append(shift)
-        variances.append(np.sum(about**2, axis=1))
+        variances.append(np.sum(about**2, axis=1) + unknown)
     return half_widths(weights, np.array(shifts), np.sqrt(variances)), left
 
 

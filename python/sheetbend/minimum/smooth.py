@@ -84,11 +84,12 @@ def with_fields(
     Raises:
         InputError: no scene has such a field, a mode is a parameter already, or a size or length is not positive.
     """
-    known = {s.field.name: s.field for e in experiments for s in e.scene.solids.values() if s.field is not None}
+    objects = [o for e in experiments for o in (*e.scene.solids.values(), *e.scene.cloths.values())]
+    known = {o.field.name: o.field for o in objects if o.field is not None}
     fields = []
     for name, wanted in smooth.items():
         if name not in known:
-            fix = f"name one of: {', '.join(known) or 'none, give a solid of clusters stiffness_modes'}"
+            fix = f"name one of: {', '.join(known) or 'none, give a cloth or a solid of clusters stiffness_modes'}"
             raise InputError(f"smooth.{name}", "names no field of the scenes", name, fix)
         modes = known[name]
         for what in ("size", "length"):

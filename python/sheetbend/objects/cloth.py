@@ -20,6 +20,7 @@ from .flat_size import FlatSize
 from .hinges import Hinges
 from .laws import Law, Linear
 from .sheet_bending import SheetCurvature
+from .stiffness_field import StiffnessField, field_of_triangles
 from .yielding import check_yield
 
 MODELS = ("curvature", "dihedral", "isometric_bending")
@@ -35,6 +36,7 @@ class Cloth:
         fabric: prefix of its fabric's quantities.
         numbers: of its fabric as given, those left out too.
         sizes: `warp_size` and `weft_size` as given.
+        field: how its stiffness varies from triangle to triangle; None = it does not.
     """
 
     name: str
@@ -43,6 +45,7 @@ class Cloth:
     fabric: str
     numbers: Mapping[str, Any]
     sizes: Mapping[str, Any]
+    field: StiffnessField | None = None
 
 
 def cloth(
@@ -106,6 +109,7 @@ def add_cloth(
     drag_quadratic: float | None = None,
     warp_size: float | None = None,
     weft_size: float | None = None,
+    stiffness_modes: int = 0,
 ) -> Cloth:
     """Add a cloth to a scene.
 
@@ -113,7 +117,7 @@ def add_cloth(
     `sheetbend.laws`) such as `_warp_stiffening`, and where given `_bending`, `_bending_weft`,
     `_bending_twist` N m, `_membrane_damping` s,
     `_bend_damping` s, `_yield_curvature` 1/m, `_yield_share`, `_drag_linear` N s/m^3, `_drag_quadratic` N s^2/m^4;
-    and of this cut alone, where given, `<name>_warp_size` and `<name>_weft_size`.
+    and of this cut alone, where given, `<name>_warp_size`, `<name>_weft_size` and `<name>_stiffness_1` and so on.
 
     The membrane's energy per area is Y_warp f(E_uu)^2 + 2 n sqrt(Y_warp Y_weft) f(E_uu) f(E_vv) + Y_weft f(E_vv)^2,
     over 2 (1 - n^2), plus G f(2 E_uv)^2/2, in Green strain (core/constraints/membrane.h).
@@ -149,6 +153,9 @@ def add_cloth(
             what it would be without tension, its area and its mass follow, and the numbers of the fabric stay. The
             initial shape, places of markers on the mesh and angles at rest of `curved` are kept. Give 1.0 to fit what a
             measurement leaves open. None = that of the mesh, and no quantity. Of the curvature model.
+        stiffness_modes: by how many smooth modes the logarithm of the membrane's stiffness (warp, weft and shear alike)
+            varies from triangle to triangle. The quantities are `<name>_stiffness_1` and so on, the smoothest first,
+            each the root mean square of what it adds; 0 at the start. `smooth` of `fit` gives them a prior.
 
     Raises:
         SceneError: wrong or missing values, or others than those of a cut before; a mesh whose diagonals bias bending.
@@ -196,7 +203,11 @@ def add_cloth(
     size = FlatSize.add(scene, mesh, name, warp_size, weft_size, None if bending is None else bending_model)
     _weigh(scene, mesh, fabric, particles, density, drag_linear, drag_quadratic, size)
     stiffness = (warp, weft, shear, poisson)
-    _membrane(scene, mesh, name, fabric, particles, free, stiffness, law or Linear(), membrane_damping, size)
+    kept = np.flatnonzero(free[mesh.triangles].any(axis=1))
+    varying = None
+    if stiffness_modes:
+        varying = field_of_triangles(scene, mesh, name, f"{fabric}_warp", stiffness_modes, kept)
+    _membrane(scene, mesh, name, fabric, particles, kept, stiffness, law or Linear(), membrane_damping, size, varying)
     if bending is not None:
         if bending_model == "curvature":
             sheet = SheetCurvature(mesh, free)
@@ -206,7 +217,7 @@ def add_cloth(
             )
         else:
             Hinges(mesh, free).add(scene, name, fabric, particles, bending, bending_model, curved, bend_damping)
-    built = Cloth(name, mesh, particles, fabric, numbers, {"warp_size": warp_size, "weft_size": weft_size})
+    built = Cloth(name, mesh, particles, fabric, numbers, {"warp_size": warp_size, "weft_size": weft_size}, varying)
     scene.cloths[name] = built
     return built
 
@@ -249,14 +260,14 @@ def _membrane(
     name: str,
     fabric: str,
     particles: Array,
-    free: Array,
+    kept: Array,
     stiffness: tuple[float, float | None, float, float],
     law: Law,
     damping: float | None,
     size: FlatSize,
+    field: StiffnessField | None,
 ) -> None:
     warp, weft, shear, poisson = stiffness
-    kept = np.flatnonzero(free[mesh.triangles].any(axis=1))
     corners, areas = mesh.corners[kept], mesh.areas[kept]
     count = len(kept)
     coefficients = list(law.coefficients())
@@ -274,6 +285,7 @@ def _membrane(
         stiffness=(f"{fabric}_warp", warp, "N/m"),
         damping=(f"{fabric}_membrane_damping", damping),
         size=size,
+        varies=() if field is None else tuple(zip(field.modes, field.shapes.T, strict=True)),
     )
     size.strains(scene, f"{name}_membrane", values)
     terms = []

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..quantities.quantities import Term
@@ -21,6 +23,7 @@ def add_elastic_group(
     stiffness: tuple[str, float, str],
     damping: tuple[str, float | None],
     size: FlatSize = AS_MESH,
+    varies: Sequence[tuple[str, Array]] = (),
 ) -> Array:
     """Add constraints of compliance 1/(scale stiffness), damped by stiffness times a Kelvin-Voigt time constant.
 
@@ -32,6 +35,7 @@ def add_elastic_group(
         stiffness: name, value and unit of its quantity, which groups of equal value share.
         damping: name and value, s, of the time constant's, likewise; None = undamped.
         size: of the flat cloth, with whose area the scale grows.
+        varies: quantities and their weights (count,), whose sum is added to the logarithm of the stiffness of each.
 
     Returns:
         (count,) where each constraint's own parameters start in the input array "rest".
@@ -50,10 +54,11 @@ def add_elastic_group(
     group, first, _ = scene.group(name)
     at = first + np.arange(count)
     scene.add_quantity(quantity, value, unit, shared=True)
-    scene.add_terms([Term("compliance", at, 1.0 / scale, ((quantity, "inverse"), *size.power(-1, -1)))])
+    less = tuple((mode, -weight) for mode, weight in varies)
+    scene.add_terms([Term("compliance", at, 1.0 / scale, ((quantity, "inverse"), *size.power(-1, -1)), less)])
     if constant is not None:
         scene.add_quantity(label, constant, "s", shared=True)
         factors = ((label, "identity"), (quantity, "identity"), *size.power(1, 1))
-        scene.add_terms([Term("damping", at, scale, factors)])
+        scene.add_terms([Term("damping", at, scale, factors, tuple(varies))])
     values: Array = first_value(scene, name) + group.rest.shape[1] * np.arange(count)
     return values

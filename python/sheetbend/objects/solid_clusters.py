@@ -20,14 +20,13 @@ from ..errors import SceneError
 from ..mesh import SolidMesh
 from ..quantities.quantities import Term
 from ..scene.scene import Array, Scene
-from .stiffness_field import StiffnessField, modes_of
+from .stiffness_field import StiffnessField, field_of_modes, modes_of
 
 SHARE = 1e-3
 """The part of the mass that moves with the frames. A frame without inertia would not be found by every method; one with
 this share of its cluster's mass follows within a 30th of the slowest period. What it has, the vertices have not, so
 that the solid keeps its mass and its moments of inertia."""
 FLAT = 1e-6  # the least over the largest second moment of a cluster
-SCALE = 0.3  # of a mode of ln E: what it may well be
 
 
 def cluster_boxes(mesh: SolidMesh, size: float) -> list[Array]:
@@ -151,11 +150,7 @@ class SolidClusters:
         sets = [set(own.tolist()) for own in every]
         linked = [(a, b) for a, b in combinations(range(len(every)), 2) if sets[a] & sets[b]]
         values, shapes = modes_of(centers, np.array(linked, dtype=np.intp).reshape(-1, 2))
-        names = tuple(
-            self.scene.add_quantity(f"{self.material}_stiffness_{k}", 0.0, "", positive=False, scale=SCALE)
-            for k in range(1, modes + 1)
-        )
-        return StiffnessField(stiffness, names, values, shapes[:, 1 : modes + 1], centers)
+        return field_of_modes(self.scene, self.material, stiffness, modes, values, shapes, centers)
 
     def _moduli(self, E: ArrayLike) -> list[str]:
         """The quantity of each cluster."""

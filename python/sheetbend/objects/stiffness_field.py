@@ -1,10 +1,11 @@
-"""A stiffness that varies smoothly from cluster to cluster, as the logarithm of a mean one and smooth modes.
+"""A stiffness that varies smoothly from place to place, as the logarithm of a mean one and smooth modes.
 
-ln E of cluster c is ln E + sum_k shapes[c, k] q_k, with one quantity q_k for each mode. The modes are eigenvectors of
-the graph Laplacian of the clusters: the first bends least from neighbor to neighbor, the next more. Their eigenvalues
-are squared wave numbers (1/m^2), so a prior of a given length is one of independent modes, whose deviations fall as
-1/(1 + length^2 eigenvalue): a field of Matern's class (Whittle 1954, Biometrika 41; Lindgren, Rue & Lindstrom 2011,
-J. R. Stat. Soc. B 73).
+Places are the clusters of a solid or the triangles of a cloth. ln E of place c is ln E + sum_k shapes[c, k] q_k, with
+one quantity q_k for each mode. The modes are eigenvectors of the Laplace operator, that of the graph of clusters or in
+finite elements on the mesh of a cloth: the first bends least from place to place, the next more. Their eigenvalues are
+squared wave numbers (1/m^2), so a prior of a given length is one of independent modes, whose deviations fall as
+1/(1 + length^2 eigenvalue): a field of Matern's class (Whittle 1954, Biometrika 41; Lindgren, Rue & Lindstrom 2011, J.
+R. Stat. Soc. B 73).
 """
 
 from __future__ import annotations
@@ -14,8 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import SceneError
+from ..mesh import TriangleMesh
+from ..scene.scene import Scene
+
 Array = NDArray[np.float64]
 FLAT = 1e-6  # of the longest extent: along shorter ones neighbors do not differ
+SCALE = 0.3  # of a mode of ln E: what it may well be
+MOST = 4000  # triangles, whose modes take a matrix of their number squared
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,9 +32,12 @@ class StiffnessField:
     Attributes:
         stiffness: name of the mean stiffness.
         modes: names of the quantities of the modes, smoothest first.
-        eigenvalues: (clusters,) 1/m^2, ascending, of all modes; the first is that of the constant.
-        shapes: (clusters, modes), of mean square 1: a quantity is the root mean square of what it adds to ln E.
-        centers: (clusters, 3) m, at rest.
+        eigenvalues: (places,) 1/m^2, ascending, of all modes; the first is that of the constant.
+        shapes: (places, modes), of mean square 1: a quantity is the root mean square of what it adds to ln E.
+        centers: (places, 3) m, at rest.
+        finer: (places, others) likewise, of the modes that have no quantity.
+        unit: of the stiffness.
+        place: what one place is called.
     """
 
     stiffness: str
@@ -35,6 +45,9 @@ class StiffnessField:
     eigenvalues: Array
     shapes: Array
     centers: Array
+    finer: Array
+    unit: str = "Pa"
+    place: str = "cluster"
 
     @property
     def name(self) -> str:
@@ -49,8 +62,80 @@ class StiffnessField:
     def deviations(self, size: float, length: float) -> Array:
         """(modes,) standard deviations of the prior of a field with a root mean square `size` of ln E about its mean
         and a length of correlation, m."""
+        return self._of_all(size, length)[: len(self.modes)]
+
+    def left_out(self, size: float, length: float) -> Array:
+        """(places,) variance of ln E that the prior expects of the modes that have no quantity."""
+        return np.asarray(np.sum((self.finer * self._of_all(size, length)[len(self.modes) :]) ** 2, axis=1))
+
+    def _of_all(self, size: float, length: float) -> Array:
         falls = 1.0 / (1.0 + length**2 * self.eigenvalues[1:])
-        return np.asarray(size * (falls / np.sqrt(np.sum(falls**2)))[: len(self.modes)])
+        return np.asarray(size * (falls / np.sqrt(np.sum(falls**2))))
+
+
+def field_of_modes(
+    scene: Scene,
+    name: str,
+    stiffness: str,
+    modes: int,
+    values: Array,
+    shapes: Array,
+    centers: Array,
+    unit: str = "Pa",
+    place: str = "cluster",
+) -> StiffnessField:
+    """The field of the first modes behind the constant, with the quantities `<name>_stiffness_1` and so on.
+
+    Args:
+        values, shapes: of `modes_of`.
+    """
+    names = tuple(
+        scene.add_quantity(f"{name}_stiffness_{k}", 0.0, "", positive=False, scale=SCALE) for k in range(1, modes + 1)
+    )
+    own, finer = shapes[:, 1 : modes + 1], shapes[:, modes + 1 :]
+    return StiffnessField(stiffness, names, values, own, centers, finer, unit, place)
+
+
+def field_of_triangles(
+    scene: Scene, mesh: TriangleMesh, name: str, stiffness: str, modes: int, kept: NDArray[np.intp]
+) -> StiffnessField:
+    """Over the triangles of a cloth that can move.
+
+    Raises:
+        SceneError: too many modes or triangles.
+    """
+    where = f"{name}.stiffness_modes"
+    if isinstance(modes, bool) or not isinstance(modes, int) or modes < 1:
+        raise SceneError(where, "must be a whole number", modes, "give how many smooth modes, such as 20")
+    if len(kept) > MOST:
+        raise SceneError(where, f"are for cloths of up to {MOST} triangles", len(kept), "give a coarser mesh")
+    values, shapes = modes_of_triangles(mesh.corners[kept], mesh.triangles[kept])
+    if modes >= len(values):
+        most = f"give at most {len(values) - 1}, one fewer than vertices of triangles that can move"
+        raise SceneError(where, "are more than the mesh has", modes, most)
+    centers = mesh.vertices[mesh.triangles[kept]].mean(axis=1)
+    return field_of_modes(scene, name, stiffness, modes, values, shapes, centers, "N/m", "triangle")
+
+
+def modes_of_triangles(corners: Array, triangles: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Eigenvalues (n,) 1/m^2 of the Laplace operator with free edges in linear finite elements, and its eigenvectors
+    (triangles, n) as means over the triangles. Before that their mean square over the area is 1.
+
+    Args:
+        corners: (triangles, 3, 2) m, flat.
+        triangles: (triangles, 3) vertices.
+    """
+    known, places = np.unique(triangles, return_inverse=True)
+    n, places = len(known), places.reshape(triangles.shape)
+    opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
+    twice = np.abs(opposite[:, 0, 0] * opposite[:, 1, 1] - opposite[:, 0, 1] * opposite[:, 1, 0])
+    weights = np.einsum("tia,tja->tij", opposite, opposite) / (2.0 * twice)[:, None, None]
+    laplacian = np.zeros((n, n))
+    np.add.at(laplacian, (places[:, :, None], places[:, None, :]), weights)
+    area = np.bincount(places.ravel(), np.repeat(twice / 6.0, 3), n)
+    values, vectors = np.linalg.eigh(laplacian / np.sqrt(np.outer(area, area)))
+    shapes = _signed(vectors / np.sqrt(area / area.sum())[:, None])
+    return np.maximum(values, 0.0), shapes[places].mean(axis=1)
 
 
 def modes_of(centers: Array, neighbors: NDArray[np.intp]) -> tuple[Array, Array]:
@@ -73,5 +158,10 @@ def modes_of(centers: Array, neighbors: NDArray[np.intp]) -> tuple[Array, Array]
     laplacian += laplacian.T
     laplacian -= np.diag(laplacian.sum(axis=1))
     values, vectors = np.linalg.eigh(laplacian)
-    strongest = vectors[np.argmax(np.abs(vectors), axis=0), np.arange(n)]
-    return np.maximum(values, 0.0), vectors * np.sign(strongest) * np.sqrt(n)
+    return np.maximum(values, 0.0), _signed(vectors) * np.sqrt(n)
+
+
+def _signed(vectors: Array) -> Array:
+    """With the largest entry of each column positive."""
+    strongest = vectors[np.argmax(np.abs(vectors), axis=0), np.arange(vectors.shape[1])]
+    return np.asarray(vectors * np.sign(strongest))

@@ -9,20 +9,21 @@ from ..result.field import KNOWN, PRIOR_ALONE, FieldFit
 from ..result.result import FitData
 from .tables import Section
 
-LISTED = 24  # clusters at most; fit.json has all
+LISTED = 24  # places at most; fit.json has all
 
 
 def stiffness_fields(result: FitData) -> list[Section]:
-    """The priors of all fields, and the stiffness of the clusters of each."""
+    """The priors of all fields, and the stiffness of the places of each."""
     if not result.fields:
         return []
     rows = [_row(field) for field in result.fields]
-    headers = ("field", "clusters", "E from", "to", "unit", "size", "95 %", "length", "95 %", "unit")
+    headers = ("field", "places", "E from", "to", "unit", "size", "95 %", "length", "95 %", "unit")
     notes = [
+        ("E", "the stiffness of a cluster of a solid, or of a triangle of a cloth along the warp"),
         ("size", "rms of ln E about its mean that the prior expects; length: over which neighbors are alike"),
         ("95 %", "interval of what was found from the recordings; open: they do not determine it"),
     ]
-    return [Section("Stiffness fields", headers, tuple(rows), tuple(notes)), *map(_clusters, result.fields)]
+    return [Section("Stiffness fields", headers, tuple(rows), tuple(notes)), *map(_places, result.fields)]
 
 
 def _row(f: FieldFit) -> tuple[str, ...]:
@@ -31,7 +32,7 @@ def _row(f: FieldFit) -> tuple[str, ...]:
         str(len(f.stiffness)),
         short(min(f.stiffness), 3),
         short(max(f.stiffness), 3),
-        "Pa",
+        f.unit,
         short(f.size, 2),
         _interval(f.size_lower, f.size_upper, 1.0),
         short(1e3 * f.length, 2),
@@ -50,11 +51,11 @@ def _interval(lower: float | None, upper: float | None, factor: float) -> str:
     return f"{short(factor * lower, 2)} to {short(factor * upper, 2)}"
 
 
-def _clusters(f: FieldFit) -> Section:
+def _places(f: FieldFit) -> Section:
     known = sum(left < KNOWN for left in f.left)
     alone = sum(left > PRIOR_ALONE for left in f.left)
     note = (
-        f"of the prior's variance about the mean. {known} of {len(f.left)} clusters are known from the data (below "
+        f"of the prior's variance about the mean. {known} of {len(f.left)} {f.place}s are known from the data (below "
         f"{100 * KNOWN:.0f} %), {alone} from the prior alone (above {100 * PRIOR_ALONE:.0f} %)"
     )
     rows = [
@@ -69,6 +70,6 @@ def _clusters(f: FieldFit) -> Section:
             zip(f.centers[:LISTED], f.stiffness, f.half_widths, f.left, strict=False)
         )
     ]
-    more = [("not listed", f"{len(f.left) - LISTED} clusters; fit.json has all")] if len(f.left) > LISTED else []
-    headers = ("cluster", "center (mm)", "E (Pa)", "+/-", "left")
-    return Section(f"Stiffness of the clusters: {f.name}", headers, tuple(rows), (("left", note), *more))
+    more = [("not listed", f"{len(f.left) - LISTED} {f.place}s; fit.json has all")] if len(f.left) > LISTED else []
+    headers = (f.place, "center (mm)", f"E ({f.unit})", "+/-", "left")
+    return Section(f"Stiffness of the {f.place}s: {f.name}", headers, tuple(rows), (("left", note), *more))

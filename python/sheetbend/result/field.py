@@ -9,7 +9,7 @@ KNOWN, PRIOR_ALONE = 0.1, 0.9  # share of the prior's variance that the data lea
 
 @dataclass(frozen=True, kw_only=True)
 class FieldFit:
-    """A field of stiffness with a smoothness prior.
+    """A field of stiffness with a smoothness prior, over the clusters of a solid or the triangles of a cloth.
 
     Attributes:
         name: of the field, such as "toy_stiffness".
@@ -17,12 +17,14 @@ class FieldFit:
         size_lower, size_upper: of its 95 % interval, 0 and None at open ends; both None where the size was given.
         length: m, over which neighbors are alike.
         length_lower, length_upper: likewise.
-        centers: m, of the clusters at rest.
-        stiffness: Pa, of each cluster.
-        half_widths: of ln E of each cluster, 95 %, with the prior. They count the uncertainty of a size and a length
-            that were found.
-        left: of each cluster, the share of the prior's variance of ln E about its mean that the data leave, on average
+        centers: m, of the places at rest.
+        stiffness: of each place, in `unit`.
+        half_widths: of ln E of each place, 95 %, with the prior. They count the uncertainty of a size and a length that
+            were found, and what the prior expects of modes finer than those that are fitted.
+        left: of each place, the share of the prior's variance of ln E about its mean that the data leave, on average
             over the sizes and lengths that are possible.
+        unit: of the stiffness.
+        place: what one place is called.
     """
 
     name: str
@@ -36,3 +38,5 @@ class FieldFit:
     stiffness: tuple[float, ...]
     half_widths: tuple[float, ...]
     left: tuple[float, ...]
+    unit: str = "Pa"
+    place: str = "cluster"

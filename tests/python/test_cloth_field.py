@@ -1,0 +1,136 @@
+"""Stiffness that varies smoothly over the triangles of a cloth: its modes, and fits of them under a prior."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sheetbend as sb
+import tomli_w
+from sheetbend.config import load
+from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.objects.stiffness_field import StiffnessField
+
+SIDE, WARP, NOISE = 0.3, 20.0, 3e-4
+SOLVER, TIMES = sb.Solver(h=0.01, method="newton"), np.arange(25) / 50
+SEEN = range(0, 49, 2)
+
+
+def hung(modes: int = 0, cells: int = 6, **more: Any) -> sb.Scene:
+    """A square cloth that is held at two corners and falls."""
+    mesh = sb.mesh.grid(SIDE, SIDE, cells, cells, pattern="one_way")
+    given: dict[str, Any] = {"density": 0.2, "warp": WARP, "shear": 8.0, "bending": 1e-4, "membrane_damping": 0.01}
+    return sb.cloth(mesh, pinned=[0, cells], stiffness_modes=modes, **(given | more))
+
+
+def field_of(scene: sb.Scene) -> StiffnessField:
+    found = scene.cloths["cloth"].field
+    assert found is not None
+    return found
+
+
+def seen(modes: int, q: np.ndarray) -> sb.Experiment:
+    """Half of the vertices, with noise, of a cloth whose stiffness has the amplitudes q of its first modes; to be
+    explained with fewer modes."""
+    scene = hung(len(q))
+    x = sb.simulate(scene, TIMES, SOLVER, values=dict(zip(field_of(scene).modes, q, strict=True))).positions[:, SEEN]
+    x = x + NOISE * np.random.default_rng(0).standard_normal(x.shape)
+    places = [sb.on_particle(i) for i in SEEN]
+    recording = sb.Recording(x, TIMES, name="fall")
+    return sb.Experiment(scene=hung(modes), recording=recording, markers=places, solver=SOLVER, sigma=NOISE)
+
+
+def test_modes_of_a_square_are_its_waves() -> None:
+    """Of the Laplace operator with free edges: cosines with (a^2 + b^2) pi^2/side^2."""
+    field = field_of(hung(2, cells=14))
+    assert field.eigenvalues[1:9] / (np.pi / SIDE) ** 2 == pytest.approx([1, 1, 2, 4, 4, 5, 5, 8], rel=0.035)
+    assert np.mean(field.shapes**2, axis=0) == pytest.approx([1, 1], rel=0.02)
+    waves = np.cos(np.pi * field.centers[:, :2] / SIDE)
+    in_them, *_ = np.linalg.lstsq(waves, field.shapes, rcond=None)
+    assert waves @ in_them == pytest.approx(field.shapes, abs=0.06)
+
+
+def test_modes_scale_the_membrane_of_each_triangle() -> None:
+    scene, q = hung(3), np.array([0.3, -0.2, 0.1])
+    field, at = field_of(scene), 0
+    compiled, names = scene.compiled, list(scene.quantities)
+    values = np.array([scene.quantities[name].value for name in names])
+    plain = compiled.inputs(values)
+    values[[names.index(mode) for mode in field.modes]] = q
+    varied = compiled.inputs(values)
+    factor = np.exp(field.shapes @ q)
+    for array, power in (("compliance", -1.0), ("damping", 1.0)):
+        at, _ = compiled.layout[array]
+        _, first, _ = scene.group("cloth_membrane")
+        own = slice(at + first, at + first + len(factor))
+        assert varied[own] == pytest.approx(plain[own] * factor**power)
+        plain[own] = varied[own]
+    assert np.array_equal(plain, varied)
+
+
+def test_the_jacobian_is_that_of_differences() -> None:
+    e = seen(3, np.array([0.3, -0.2, 0.1]))
+    problem = FitProblem([e], as_parameters(["cloth_warp", *field_of(e.scene).modes], [e]))
+    u = problem.parameters.initial() + 0.1
+    _, _, J = problem.evaluate(u)
+    for k in range(4):
+        step = 1e-5 * np.eye(4)[k]
+        after, before = (problem.evaluate(u + s * step, jacobian=False)[1] for s in (1, -1))
+        assert (after - before) / 2e-5 == pytest.approx(J[:, k], abs=1e-4 * np.abs(J[:, k]).max())
+
+
+def test_intervals_of_triangles_count_the_modes_that_are_not_fitted() -> None:
+    whole = field_of(hung(48))
+    q = whole.deviations(0.3, 0.1) * np.random.default_rng(2).standard_normal(48)
+    lnE = np.log(WARP) + whole.shapes @ q
+    few = {"refine": False, "profiles": False, "beginnings": False, "windows": ()}
+    fit = sb.fit(seen(8, q), parameters=["cloth_warp"], smooth={"cloth_stiffness": sb.Smooth(0.3, 0.1)}, **few)
+    (found,) = fit.result.fields
+    off = np.abs(np.log(found.stiffness) - lnE)
+    assert (off < found.half_widths).sum() >= 65  # of 72, 90 %
+    finer = field_of(hung(8)).left_out(0.3, 0.1)
+    assert (np.array(found.half_widths) > 1.95 * np.sqrt(finer)).all() and finer.min() > 0.0
+    assert 0.0 < min(found.left) < max(found.left) <= 1.0
+    assert (found.unit, found.place) == ("N/m", "triangle") and "triangles are known from the data" in fit.report()
+
+
+def test_what_makes_no_field_is_refused() -> None:
+    for modes, words in (
+        (49, "are more than the mesh has .*give at most 48"),
+        (-1, "must be a whole number"),
+        (True, "must be a whole number"),
+    ):
+        with pytest.raises(sb.SceneError, match=f"cloth.stiffness_modes: {words}"):
+            hung(modes)
+    with pytest.raises(sb.SceneError, match=r"cloth.stiffness_modes: are for cloths of up to 4000 triangles"):
+        hung(2, cells=45)
+
+
+def test_a_configuration_fits_a_field_on_its_mesh_alone(tmp_path: Path) -> None:
+    e = seen(2, np.array([0.3, 0.1]))
+    e.recording.save(tmp_path / "fall.npz")
+    x = e.scene.cloths["cloth"].mesh.vertices
+    mesh = {"kind": "grid", "width": SIDE, "height": SIDE, "nx": 6, "ny": 6, "pattern": "one_way"}
+    numbers = {"density": 0.2, "warp": WARP, "shear": 8.0, "bending": 1e-4, "membrane_damping": 0.01}
+    corners = {"name": "held", "points": [x[0].tolist(), x[6].tolist()]}
+    cloth = numbers | {"name": "cloth", "mesh": mesh, "set": [corners], "pinned": ["held"], "stiffness_modes": 2}
+    cloth["markers"] = {f"m{k}": x[i, :2].tolist() for k, i in enumerate(SEEN)}
+    config = {
+        "experiment": {"name": "hung"},
+        "solver": {"method": "newton", "h": 0.01},
+        "scene": {"cloth": [cloth]},
+        "recording": [{"file": "fall.npz", "sigma": NOISE}],
+        "parameters": {"cloth_warp": {}},
+        "smooth": {"cloth_stiffness": {"length": 0.1}},
+    }
+    (tmp_path / "hung.toml").write_text(tomli_w.dumps(config))
+    study = load(tmp_path / "hung.toml")
+    assert study.options["refine"].finer is None
+    problem = FitProblem(study.experiments, as_parameters(["cloth_stiffness_1"], study.experiments))
+    plain = FitProblem([e], as_parameters(["cloth_stiffness_1"], [e]))
+    assert problem.simulate(np.array([0.3]))[0] == pytest.approx(plain.simulate(np.array([0.3]))[0], abs=1e-9)
+    (tmp_path / "hung.toml").write_text(tomli_w.dumps(config | {"fit": {"double_segments": True}}))
+    with pytest.raises(sb.ConfigError, match=r"fit.double_segments: does not go with stiffness_modes"):
+        load(tmp_path / "hung.toml").options  # noqa: B018
