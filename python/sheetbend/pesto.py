@@ -14,9 +14,10 @@ import numpy as np
 
 from .errors import SheetbendError
 from .experiment.experiment import Experiment
+from .experiment.wanted import ParameterLike, as_parameters
 from .fitting.experiments import experiments_of
 from .minimum.continuity import joined
-from .minimum.problem import FitProblem, ParameterLike, as_parameters
+from .minimum.problem import FitProblem
 from .minimum.starts import drawn
 from .optional import require
 from .quantities.parameters import Parameter, Parameters

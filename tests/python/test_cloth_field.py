@@ -10,7 +10,8 @@ import pytest
 import sheetbend as sb
 import tomli_w
 from sheetbend.config import load
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.experiment.wanted import as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.objects.stiffness_field import StiffnessField
 
 SIDE, WARP, NOISE = 0.3, 20.0, 3e-4

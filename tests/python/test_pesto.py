@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from pytest import approx
-from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.experiment.wanted import as_parameters
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.optional import MissingExtraError
 from sheetbend.pesto import _Function, problem
 
