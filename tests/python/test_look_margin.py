@@ -108,6 +108,7 @@ def test_a_draft_of_a_cloth_in_wind_predicts_to_its_noise(tmp_path: Path) -> Non
     is left out: it is that of cells of 70 mm, and the report says that the mesh is not counted."""
     fit = fitted(tmp_path, "cloth_in_wind/data/cloth_in_wind.npz", "--density", "0.15", codes=(0, 4))
     assert fit.recordings[0].held_out < 1.2 * 1.72e-3
+    assert fit.iterations < 25  # it was 31: Gauss-Newton swings about this minimum by a factor of -0.75
     true = {"warp": 60.0, "shear": 23.08, "air_normal": 0.7, "air_tangential": 0.05}
     for name, value in {f"cloth_{name}": value for name, value in true.items()}.items():
         assert fit[name].verdict == "doubtful" or fit[name].lower < value < fit[name].upper, name

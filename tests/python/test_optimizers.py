@@ -98,9 +98,9 @@ def test_ceres_leaves_a_limit_that_nothing_presses_on(monkeypatch):
     runs = []
     run = optimizers._ceres_holding
 
-    def counted(problem, w, held, most, tolerance, best, watch, first):
+    def counted(problem, w, held, most, tolerance, best, watch, *more):
         runs.append((held, watch))
-        return run(problem, w, held, most, tolerance, best, watch, first)
+        return run(problem, w, held, most, tolerance, best, watch, *more)
 
     monkeypatch.setattr(optimizers, "_ceres_holding", counted)
     monkeypatch.setattr(optimizers, "_resting", lambda problem, w: resting.pop(0))

@@ -19,6 +19,7 @@ from ..statistics.gauge import RANK_TOLERANCE
 from .approach import Approach, inside
 from .conditioning import Condition
 from .counts import count, counted
+from .geometric import GeometricSteps
 from .problem import FitProblem
 
 OPTIMIZERS = ("auto", "ceres", "scipy")
@@ -208,18 +209,26 @@ class _Best:
 
 def _ceres(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: float, best: _Best) -> Minimum:
     """Ceres, with coordinates that rest at a limit held there, from the start or from where they come to it: it
-    searches along every step that it projects, and comes near a minimum beside a limit by small steps only."""
+    searches along every step that it projects, and comes near a minimum beside a limit by small steps only. Steps that
+    become a geometric series are summed up."""
     w = np.clip(problem.coordinates.into(u), *problem.coordinates.limits())
     held = _resting(problem, w)
     spent = [0, 0, 0]
-    watch = True
+    watch = sums = True
     while True:
         left = max_iterations - spent[0]
-        end, stopped = _ceres_holding(problem, w, held, left, tolerance, best, watch, spent[0])
+        steps = GeometricSteps() if sums and not problem.estimates_corrections else None
+        end, stopped = _ceres_holding(problem, w, held, left, tolerance, best, watch, steps, spent[0])
         spent = [a + b for a, b in zip(spent, (end.iterations, end.evaluations, end.jacobians), strict=True)]
         end = replace(end, iterations=spent[0], evaluations=spent[1], jacobians=spent[2])
         if end.interrupted or (stopped is None and not held):
             return end
+        if stopped is not None and steps is not None and steps.sum is not None:
+            w = np.clip(steps.sum, *problem.coordinates.limits())
+            sums = problem.cost(problem.coordinates.out(w)) < end.cost
+            spent[1] += 1
+            w = w if sums else stopped
+            continue
         w = problem.coordinates.into(end.u) if stopped is None else stopped
         resting = _resting(problem, w)
         if stopped is not None:
@@ -252,10 +261,11 @@ def _ceres_holding(
     tolerance: float,
     best: _Best,
     watch: bool,
+    steps: GeometricSteps | None,
     first: int = 0,
 ) -> tuple[Minimum, np.ndarray | None]:
-    """One run, whose iterations count on from `first`; if it is to watch, it ends where coordinates that are not held
-    have been at a limit for two iterations, and also returns that point."""
+    """One run, whose iterations count on from `first`. It ends, and also returns that point, where its steps have a
+    sum, and if it is to watch, where coordinates that are not held have been at a limit for two iterations."""
     from .. import _ceres as ceres
 
     coordinates = problem.coordinates
@@ -269,7 +279,8 @@ def _ceres_holding(
         best(first + iteration, cost, coordinates.out(here))
         limited = (here <= lower) | (here >= upper)
         limited[list(held)] = False
-        if watch and iteration > 1 and (limited & before).any():
+        summed = steps is not None and steps.add(here) and not limited.any()
+        if summed or (watch and iteration > 1 and (limited & before).any()):
             stopped = here
         before = limited
         return stopped is None
