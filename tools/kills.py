@@ -12,11 +12,11 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
+import multiprocessing
 import os
 import random
 import signal
 import sqlite3
-import subprocess
 import sys
 import tempfile
 import threading
@@ -24,6 +24,7 @@ import time
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
@@ -115,6 +116,7 @@ def fitted(kind: str, seed: int, folder: Path, path: str | None, size: int) -> d
     return fit.result.to_dict()
 
 
+FORK = multiprocessing.get_context("fork")
 ATTEMPTS = 12
 # Optimizers choose by time how often to ask.
 TIMED = ("seconds", "jacobian_seconds", "evaluations", "jacobians", "judging")
@@ -136,15 +138,16 @@ class Killed:
 
 
 class Study:
-    """Runs fits in processes of their own, in one folder."""
+    """Runs fits in processes of their own, in one folder; they are forked from this one, which has imported everything
+    and fits nothing itself."""
 
     def __init__(self, folder: Path, size: int = 1, say: Callable[[str], None] = print) -> None:
         self.folder, self.size, self.say = folder, size, say
 
     def whole(self, kind: str, seed: int) -> tuple[dict[str, Any], float]:
-        """The result of an uninterrupted fit without a journal, and its seconds, without those of Python's start."""
+        """The result of an uninterrupted fit without a journal, and its seconds."""
         prepare(kind, seed, self.folder)
-        return self._ended(self._begun(kind, seed, None))
+        return self._ended(kind, seed, None)
 
     def killed(self, kind: str, seed: int, kills: int, seconds: float) -> Killed:
         """The same with a journal, killed at random moments and resumed. Each time the process dies a while after it
@@ -160,25 +163,33 @@ class Study:
         kept_in = self.folder / f"{kind}_{seed}.sqlite"
         kept: list[int] = []
         while len(kept) < kills:
-            process = self._begun(kind, seed, kept_in, chance.uniform(0.05, 0.8) * seconds / kills)
-            process.communicate()
-            if process.returncode == 0:
+            code, _ = self._run(kind, seed, kept_in, chance.uniform(0.05, 0.8) * seconds / kills)
+            if code == 0:
                 return None
-            assert process.returncode == -signal.SIGKILL, process.returncode
+            assert code == -signal.SIGKILL, code
             kept.append(evaluations(kept_in))
-        result, _ = self._ended(self._begun(kind, seed, kept_in))
+        result, _ = self._ended(kind, seed, kept_in)
         assert not kept_in.exists(), "a finished fit leaves no journal"
         return Killed(tuple(kept), result)
 
-    def _begun(self, kind: str, seed: int, path: Path | None, wait: float | None = None) -> subprocess.Popen[str]:
-        task = json.dumps([kind, seed, str(self.folder), self.size, None if path is None else str(path), wait])
-        return subprocess.Popen([sys.executable, __file__, "--child", task], stdout=subprocess.PIPE, text=True)
+    def _run(self, kind: str, seed: int, path: Path | None, wait: float | None = None) -> tuple[int | None, str]:
+        """The exit code of a fit, and what it wrote."""
+        receives, sends = FORK.Pipe(duplex=False)
+        given = (sends, kind, seed, self.folder, self.size, None if path is None else str(path), wait)
+        process = FORK.Process(target=child, args=given)
+        process.start()
+        sends.close()
+        try:
+            told = receives.recv()
+        except EOFError:  # it was killed
+            told = ""
+        process.join()
+        return process.exitcode, told
 
-    @staticmethod
-    def _ended(process: subprocess.Popen[str]) -> tuple[dict[str, Any], float]:
-        out, _ = process.communicate()
-        assert process.returncode == 0, process.returncode
-        result, seconds = json.loads(out)
+    def _ended(self, kind: str, seed: int, path: Path | None) -> tuple[dict[str, Any], float]:
+        code, told = self._run(kind, seed, path)
+        assert code == 0, code
+        result, seconds = json.loads(told)
         return result, seconds
 
 
@@ -240,16 +251,15 @@ def mortal(wait: float) -> None:
     journal.Journal = Mortal  # type: ignore[misc]
 
 
-def child(kind: str, seed: int, folder: str, size: int, path: str | None, wait: float | None) -> None:
+def child(
+    sends: Connection, kind: str, seed: int, folder: Path, size: int, path: str | None, wait: float | None
+) -> None:
     if wait is not None:
         mortal(wait)
     began = time.perf_counter()
-    result = fitted(kind, seed, Path(folder), path, size)
-    print(json.dumps([result, time.perf_counter() - began]))
+    result = fitted(kind, seed, folder, path, size)
+    sends.send(json.dumps([result, time.perf_counter() - began]))
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["--child"]:
-        child(*json.loads(sys.argv[2]))
-    else:
-        sys.exit(main())
+    sys.exit(main())

@@ -1,5 +1,8 @@
 """Feeds mutated files to the readers: `python tests/python/fuzz.py csv --seed 1 --cases 1000` or `--seconds 600`.
 
+Several readers may be given (`csv npz:200`, of which the second gets 200 cases). Each runs in a process of its own,
+forked from one that has imported everything, and prints one line of JSON.
+
 Files that tests write and experiments ship (`fuzz_targets.py`) are cut, flipped, repeated and filled with odd numbers
 and words (`mutations.py`). A reader may read such a file or refuse it with an error of the package. A finding is
 anything else: another exception, memory beyond 1 GB, or 10 s of processor time, which ends the process by SIGPROF (a
@@ -10,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import multiprocessing
 import os
 import random
 import resource
@@ -94,18 +98,34 @@ def limit(more: int) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
+def fed(name: str, given: argparse.Namespace) -> None:
+    """Feed one reader and print what came of it; exits with 1 where there are findings."""
+    name, _, cases = name.partition(":")
+    told = run(name, given.seed, int(cases or given.cases), given.seconds, given.keep)
+    print(json.dumps(told), flush=True)
+    sys.exit(1 if told["findings"] else 0)
+
+
 def main() -> None:
-    """Run one reader from the command line; exits with 1 where there are findings."""
+    """Run readers from the command line; exits with 1 where there are findings or a process was ended."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("reader", choices=TARGETS)
+    parser.add_argument("readers", nargs="+", metavar="reader", help=", ".join(TARGETS))
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--cases", type=int, default=10**9)
     parser.add_argument("--seconds", type=float, default=1e9)
     parser.add_argument("--keep", type=Path, default=Path("fuzzed"))
     given = parser.parse_args()
-    told = run(given.reader, given.seed, given.cases, given.seconds, given.keep)
-    print(json.dumps(told, indent=1))
-    sys.exit(1 if told["findings"] else 0)
+    if unknown := {name.partition(":")[0] for name in given.readers} - set(TARGETS):
+        parser.error(f"unknown readers: {', '.join(sorted(unknown))}")
+    failed = False
+    for name in given.readers:
+        process = multiprocessing.get_context("fork").Process(target=fed, args=(name, given))
+        process.start()
+        process.join()
+        failed |= process.exitcode != 0
+        if process.exitcode and process.exitcode < 0:
+            print(json.dumps({"reader": name.partition(":")[0], "ended": -process.exitcode}), flush=True)
+    sys.exit(1 if failed else 0)
 
 
 if __name__ == "__main__":
