@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from ..errors import SheetbendError
 from ..minimum.problem import FitProblem
 from ..result.result import Start
 from .beside import Offsets, beside, frames_of, offsets_found
+from .carried import carry
 from .clock import LEAST, LEFT, lateness
 from .first_order import first_order
 from .judging import BETTER, EQUAL, Verdict, predict, verdict
@@ -66,9 +67,9 @@ class Climb:
         last = max((k for k, stays in enumerate(stayed) if stays), default=-1)
         dropped, late = list[Rung](), list[Rung]()
         for k, (rung, stays) in enumerate(zip(ladder[1:], stayed, strict=True)):
-            if not stays:  # what helped nothing before may help beside what stayed later
+            if not (stays or rung.late):  # what helped nothing before may help beside what stayed later
                 (late if k < last and self._climbed(rung) else dropped).append(rung)
-        dropped = [rung for rung in dropped if not (rung.beside or rung.late)]
+        dropped = [rung for rung in dropped if not rung.beside]
         if len(dropped) > 1 and not all(rung.small for rung in dropped):
             # or only beside another: stiffness that varies looks like yield, and yield like it
             late += dropped if self._climbed(together(dropped)) else []
@@ -77,7 +78,14 @@ class Climb:
             if (rung.beside and self.beside) or (rung.late and self.late):
                 self._climbed(rung)  # what the rope's shape had taken up of it, and gave back since
         assert self.rope is not None
+        self.gather()
         self.search.admit(self.rope)
+
+    def gather(self) -> None:
+        """Move the recordings that wait onto the rope's axis, where the others were."""
+        assert self.rope is not None
+        if self.beside:
+            self._onto(self.rope, self.beside, [m for m in self.search.split.waiting if m not in self._recorded])
 
     def _climbed(self, rung: Rung) -> bool:
         """Try a rung; whether it stays."""
@@ -91,6 +99,7 @@ class Climb:
         start = Rope(larger, parameters, self.rope.values)
         if rung.small:
             problem = self.search.problem(start, self.search.longest)
+            carry(problem, self.rope.slopes, rung.wanted(self.search.split.fitted[0]), start.values)
             told = first_order(problem, larger, start.values, self.search.split, self.search.threads)
             if told is not None and told.ratio >= BETTER:
                 return self._skip(rung, told, began)
@@ -120,8 +129,12 @@ class Climb:
 
     def _replace(self, every: Mapping[GrippedMotion, GrippedMotion]) -> None:
         """Take other motions in place of what is given and its split."""
-        self.search.given = tuple(every[m] for m in self.search.whole)
-        self.search.split = self.search.split.each(every.__getitem__)
+
+        def moved(motion: GrippedMotion) -> GrippedMotion:
+            return every.get(motion, motion)
+
+        self.search.given = tuple(moved(m) for m in self.search.whole)
+        self.search.split = self.search.split.each(moved)
 
     def _onto_axis(self, rung: Rung, rope: Rope, began: float) -> bool:
         """Try the recordings, moved onto the rope's axis; whether they stay there. What is fitted next follows them."""
@@ -158,11 +171,13 @@ class Climb:
         self.search.split = self.search.split.each(recorded)
 
     def _move(self, rope: Rope, offsets: Offsets) -> None:
-        """Take the motions with their markers on the rope's axis."""
-        every = {
-            m: m.moved(-beside(rope.model, m, rope.values, offsets))
-            for m in (*self.search.whole, *self.search.split.motions)
-        }
+        """Take the motions with their markers on the rope's axis, those that wait at last (`gather`)."""
+        split = self.search.split
+        self._onto(rope, offsets, (*split.motions, *(self.search.whole if split.cut else ())))
+
+    def _onto(self, rope: Rope, offsets: Offsets, motions: Iterable[GrippedMotion]) -> None:
+        """Take these motions with their markers on the rope's axis."""
+        every = {m: m.moved(-beside(rope.model, m, rope.values, offsets)) for m in motions}
         self._recorded |= {moved: self._recorded.get(m, m) for m, moved in every.items()}
         self._replace(every)
 
@@ -212,7 +227,7 @@ class Climb:
     def equal(self) -> list[Rope]:
         """What was tried and predicts as well as the rope that was found."""
         assert self.rope is not None
-        here = self.search.judged(self.rope).errors
+        here = self.rope.errors
         near = [rope for rope in self.tried if rope.values is not self.rope.values and _near(rope, self.rope)]
         others = [self.search.judged(rope) for rope in near]
         return [rope for rope in others if abs(verdict(rope.errors, here).ratio - 1.0) <= EQUAL]

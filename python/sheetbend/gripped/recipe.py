@@ -195,6 +195,7 @@ def fit_rope(
         if climb.rope is None:
             raise
         interrupted = True
+        climb.gather()
         say(f"interrupted: going back to {next(s.name for s in reversed(climb.steps) if s.stays)}")
     kept = climb.search.whole
     last = everything(kept, spans[-1][0]) if isinstance(windows, str) else spans[-1]
