@@ -10,6 +10,7 @@ import pytest
 import sheetbend as sb
 from sheetbend.gripped import GrippedMotion, RopeModel, descent, fit_rope
 from sheetbend.gripped.bounds import at_bounds, bounded
+from sheetbend.gripped.carried import carry, slopes_of
 from sheetbend.gripped.climb import Climb
 from sheetbend.gripped.conclusion import checked, model_spread, spread_words
 from sheetbend.gripped.descent import descend, negligible
@@ -43,6 +44,7 @@ MOTION = GrippedMotion.of(carried_about(), 0.0)
 MODEL = model_of(MOTION, smoothing=0.0)
 STIFFNESS = tuple(p for p in TWIST.parameters if p.name == "rope_EI")
 TRUE = {"rope_EI": 0.03}
+Array = np.ndarray
 
 
 @cache
@@ -318,13 +320,56 @@ class TestClimb:
         rope = Rope(MODEL.at(TRUE), STIFFNESS, TRUE)
         offsets = ((1e-3, 0.0),) * len(MOTION.free)
         for _ in range(2):
-            climb.search.given, climb.search.split = climb._moved(rope, offsets)
+            climb._move(rope, offsets)
         climb.beside, climb.rope = ((2e-3, 0.0),) * len(MOTION.free), climb.search.judged(rope)
         moved, seen = climb.search.given, list[tuple[GrippedMotion, ...]]()
         monkeypatch.setattr(Climb, "_climbed", lambda self, rung: seen.append(self.search.given) or False)
         climb._reconsider((TWIST, VARYING, BESIDE), [VARYING])
         assert seen == [tuple(recorded)] and climb.beside == () and climb.rope is not None
         assert climb.search.split.motions == Split.of(recorded, 0.25).motions and climb.search.given != moved
+
+    def test_recordings_that_wait_are_moved_onto_the_axis_at_last(self) -> None:
+        recorded = [replace(MOTION, recording=replace(MOTION.recording, name=f"{k}")) for k in range(26)]
+        climb = Climb(Search(recorded, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, lambda text: None))
+        climb.rope, offsets = Rope(MODEL.at(TRUE), STIFFNESS, TRUE), ((1e-3, 0.0),) * len(MOTION.free)
+        waiting = climb.search.split.waiting
+        climb._move(climb.rope, offsets)
+        climb.beside = offsets
+        assert waiting and climb.search.split.waiting == waiting
+        assert sum(m in recorded for m in climb.search.whole) == len(waiting)
+        for _ in range(2):
+            climb.gather()
+            assert not any(m in recorded for m in climb.search.whole)
+            free = list(MOTION.free)
+            for m in climb.search.split.waiting:
+                by = np.linalg.norm((m.recording.positions - MOTION.recording.positions)[:, free], axis=2)
+                np.testing.assert_allclose(by, 1e-3, rtol=1e-6)
+
+    def test_a_rung_of_offsets_derives_only_what_it_adds(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        wanted = [p for p in TWIST.parameters if p.name in ("rope_EI", "rope_length", "rope_roll")]
+        smaller = problem_of(experiments_of(MODEL, [MOTION], (1.0, 1.0), {}), wanted, TRUE)
+        slopes = slopes_of(smaller, smaller.evaluate(smaller.parameters.initial())[2])
+        model = TILTS.added_to(MODEL)
+        larger = [
+            problem_of(experiments_of(model, [MOTION], (1.0, 1.0), {}), (*wanted, *TILTS.parameters), TRUE)
+            for _ in range(2)
+        ]
+        asked = list[int]()
+        evaluate = FitProblem.evaluate
+
+        def evaluated(self: FitProblem, u: Array, jacobian: bool = True) -> tuple[bool, Array, Array]:
+            asked.append(len(u))
+            return evaluate(self, u, jacobian)
+
+        monkeypatch.setattr(FitProblem, "evaluate", evaluated)
+        carry(larger[0], slopes, TILTS.parameters, TRUE)
+        assert asked == [4]
+        u = larger[0].parameters.initial()
+        (_, r, J), (_, whole, own) = (evaluate(p, u) for p in larger)
+        np.testing.assert_allclose(r, whole, atol=1e-12)
+        np.testing.assert_allclose(J, own, rtol=1e-9, atol=1e-9)
+        carry(larger[1], replace(slopes, windows=((), 0)), TILTS.parameters, TRUE)  # of other windows
+        assert asked == [4]
 
     def test_the_only_recording_that_judges_can_be_left_out(self) -> None:
         """It once stayed, and every rung was judged by the one recording that does not belong."""

@@ -15,6 +15,7 @@ from sheetbend.doubts import profiles
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum import discretization, optimizers
 from sheetbend.minimum.discretization import Refinement
+from sheetbend.minimum.journal import Evaluator, Timed
 from sheetbend.minimum.optimizers import Progress, has_ceres, minimize
 from sheetbend.minimum.problem import FitProblem
 
@@ -385,3 +386,22 @@ def test_the_last_jacobian_of_ceres_is_not_made_again(monkeypatch: pytest.Monkey
     monkeypatch.setattr(problem, "evaluator", None)
     _, r, J = problem.evaluate(end.u)
     assert np.array_equal(r, fresh[1]) and np.array_equal(J, fresh[2])
+
+
+@needs_ceres
+def test_ceres_begins_with_the_jacobian_that_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It once made that of its start again, which costs as much as twenty simulations of a rope between grips."""
+    fresh, known = problem_of(swinging()), problem_of(swinging())
+    u = known.parameters.initial()
+    known.evaluate(u)
+    asked: list[tuple[bool, bool]] = []
+    evaluate = Evaluator.__call__
+
+    def evaluated(self: Evaluator, at: np.ndarray, jacobian: bool) -> Timed:
+        asked.append((np.array_equal(at, u), jacobian))
+        return evaluate(self, at, jacobian)
+
+    monkeypatch.setattr(Evaluator, "__call__", evaluated)
+    end, same = minimize(known, u, "ceres", first=1.0)[0], minimize(fresh, u, "ceres", first=1.0)[0]
+    assert asked and (True, True) not in asked
+    assert np.array_equal(end.u, same.u) and end.cost == same.cost and end.iterations == same.iterations

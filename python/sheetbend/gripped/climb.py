@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,8 +12,10 @@ from ..errors import SheetbendError
 from ..minimum.problem import FitProblem
 from ..result.result import Start
 from .beside import Offsets, beside, frames_of, offsets_found
+from .carried import carry
+from .clock import LEAST, LEFT, lateness
 from .first_order import first_order
-from .judging import BETTER, EQUAL, Split, Verdict, predict, verdict
+from .judging import BETTER, EQUAL, Verdict, predict, verdict
 from .ladder import AND, Rung, together
 from .model import NAME, RopeModel
 from .motion import GrippedMotion
@@ -32,6 +34,7 @@ class Climb:
         raced: the starts of the first rung, where they were raced.
         tried: ropes of all rungs that did not diverge.
         beside: how far the markers sit beside the rope's axis, where the recordings were moved onto it.
+        late: by how many s the markers of the grips come after the others, where the grips are taken as earlier.
     """
 
     def __init__(self, search: Search) -> None:
@@ -41,6 +44,7 @@ class Climb:
         self.tried: list[Rope] = []
         self.rope: Rope | None = None
         self.beside: Offsets = ()
+        self.late = 0.0
         self._recorded: dict[GrippedMotion, GrippedMotion] = {}  # by what was moved onto the axis
 
     def run(
@@ -63,7 +67,7 @@ class Climb:
         last = max((k for k, stays in enumerate(stayed) if stays), default=-1)
         dropped, late = list[Rung](), list[Rung]()
         for k, (rung, stays) in enumerate(zip(ladder[1:], stayed, strict=True)):
-            if not stays:  # what helped nothing before may help beside what stayed later
+            if not (stays or rung.late):  # what helped nothing before may help beside what stayed later
                 (late if k < last and self._climbed(rung) else dropped).append(rung)
         dropped = [rung for rung in dropped if not rung.beside]
         if len(dropped) > 1 and not all(rung.small for rung in dropped):
@@ -71,21 +75,31 @@ class Climb:
             late += dropped if self._climbed(together(dropped)) else []
         self._reconsider(ladder, late)
         for rung in ladder:
-            if rung.beside and self.beside:
-                self._climbed(rung)  # what the rope's shape had taken up of the offsets, and gave back since
+            if (rung.beside and self.beside) or (rung.late and self.late):
+                self._climbed(rung)  # what the rope's shape had taken up of it, and gave back since
         assert self.rope is not None
+        self.gather()
         self.search.admit(self.rope)
+
+    def gather(self) -> None:
+        """Move the recordings that wait onto the rope's axis, where the others were."""
+        assert self.rope is not None
+        if self.beside:
+            self._onto(self.rope, self.beside, [m for m in self.search.split.waiting if m not in self._recorded])
 
     def _climbed(self, rung: Rung) -> bool:
         """Try a rung; whether it stays."""
         began = time.perf_counter()
         assert self.rope is not None
+        if rung.late:
+            return self._on_clock(rung, self.rope, began)
         if rung.beside:
             return self._onto_axis(rung, self.rope, began)
         larger, parameters = self._with(rung, self.rope)
         start = Rope(larger, parameters, self.rope.values)
         if rung.small:
             problem = self.search.problem(start, self.search.longest)
+            carry(problem, self.rope.slopes, rung.wanted(self.search.split.fitted[0]), start.values)
             told = first_order(problem, larger, start.values, self.search.split, self.search.threads)
             if told is not None and told.ratio >= BETTER:
                 return self._skip(rung, told, began)
@@ -95,12 +109,39 @@ class Climb:
         self._keep(rung, found, None if found is None else verdict(found.errors, self.rope.errors), began)
         return self.steps[-1].stays
 
+    def _on_clock(self, rung: Rung, rope: Rope, began: float) -> bool:
+        """Try the grips as so much earlier as their markers come late; whether that stays."""
+        search = self.search
+        given, split = search.given, search.split
+        by = lateness(rope.model, split.fitted, rope.values, search.threads)
+        if by is None or abs(by) < (LEFT if self.late else LEAST):
+            return self._skip(rung, verdict(rope.errors, rope.errors), began)
+        self._replace({m: m.later(by) for m in (*search.whole, *split.motions)})
+        found = self._long(rung.name, rope)
+        told = None if found is None else verdict(found.errors, rope.errors)
+        if told is not None and told.stays:
+            self.late += by
+            search.say(f"the markers of the grips come {1e3 * self.late:.3g} ms after the others")
+        else:
+            search.given, search.split = given, split
+        self._keep(rung, found, told, began)
+        return self.steps[-1].stays
+
+    def _replace(self, every: Mapping[GrippedMotion, GrippedMotion]) -> None:
+        """Take other motions in place of what is given and its split."""
+
+        def moved(motion: GrippedMotion) -> GrippedMotion:
+            return every.get(motion, motion)
+
+        self.search.given = tuple(moved(m) for m in self.search.whole)
+        self.search.split = self.search.split.each(moved)
+
     def _onto_axis(self, rung: Rung, rope: Rope, began: float) -> bool:
         """Try the recordings, moved onto the rope's axis; whether they stay there. What is fitted next follows them."""
         given, split = self.search.given, self.search.split
         found, offsets = None, self._offsets(rope)
         if offsets is not None:
-            self.search.given, self.search.split = self._moved(rope, offsets)
+            self._move(rope, offsets)
             found = self.search.judged(rope)
         told = None if found is None else verdict(found.errors, rope.errors)
         if told is not None and told.stays and offsets is not None:
@@ -129,14 +170,16 @@ class Climb:
         self.search.given, self.beside = tuple(recorded(m) for m in self.search.given), ()
         self.search.split = self.search.split.each(recorded)
 
-    def _moved(self, rope: Rope, offsets: Offsets) -> tuple[tuple[GrippedMotion, ...], Split]:
-        """What is given and its split, with the markers on the rope's axis."""
-        every = {
-            m: m.moved(-beside(rope.model, m, rope.values, offsets))
-            for m in (*self.search.whole, *self.search.split.motions)
-        }
+    def _move(self, rope: Rope, offsets: Offsets) -> None:
+        """Take the motions with their markers on the rope's axis, those that wait at last (`gather`)."""
+        split = self.search.split
+        self._onto(rope, offsets, (*split.motions, *(self.search.whole if split.cut else ())))
+
+    def _onto(self, rope: Rope, offsets: Offsets, motions: Iterable[GrippedMotion]) -> None:
+        """Take these motions with their markers on the rope's axis."""
+        every = {m: m.moved(-beside(rope.model, m, rope.values, offsets)) for m in motions}
         self._recorded |= {moved: self._recorded.get(m, m) for m, moved in every.items()}
-        return tuple(every[m] for m in self.search.whole), self.search.split.each(every.__getitem__)
+        self._replace(every)
 
     def _reconsider(self, ladder: Sequence[Rung], late: Sequence[Rung]) -> None:
         """Take back offsets of grips and markers that stayed before a part of the rope itself did: they may have stood
@@ -184,7 +227,7 @@ class Climb:
     def equal(self) -> list[Rope]:
         """What was tried and predicts as well as the rope that was found."""
         assert self.rope is not None
-        here = self.search.judged(self.rope).errors
+        here = self.rope.errors
         near = [rope for rope in self.tried if rope.values is not self.rope.values and _near(rope, self.rope)]
         others = [self.search.judged(rope) for rope in near]
         return [rope for rope in others if abs(verdict(rope.errors, here).ratio - 1.0) <= EQUAL]

@@ -34,12 +34,14 @@ class Descent:
         cost: half the sum of squared residuals; infinite where the start has no answer.
         iterations: steps.
         ended: whether a minimum was reached.
+        jacobian: (rows, free) the last derivative, at the end or not far from it; None where none was made.
     """
 
     values: dict[str, float]
     cost: float
     iterations: int
     ended: bool
+    jacobian: Array | None = None
 
     @property
     def finite(self) -> bool:
@@ -55,18 +57,21 @@ class Sparing(Approach):
     Attributes:
         sure: whether the last step followed a derivative that was computed where it began.
         computed: number of such steps so far.
+        latest: the last derivative.
     """
 
     def __init__(self, problem: FitProblem, u: Array) -> None:
         super().__init__(problem, u)
         self.sure, self.computed, self._corrected = True, 0, 0
         self._most = CORRECTIONS if len(self.u) >= DEAR else 0
+        self.latest = self._J
 
     def step(self) -> bool:
         """As `Approach.step`; a corrected derivative that shows no way down is computed first."""
         if self._J is None:
             self._compute()
         u, r, J, radius = self.u, self._r, self._J, self._radius
+        self.latest = J
         self.sure = self._corrected == 0
         moved = super().step()
         if not self.sure:  # what held it up may be the derivative
@@ -81,7 +86,7 @@ class Sparing(Approach):
             step = self.u - u
             weighted = step / self._longest**2
             self._J = J + np.outer(self._r - r - J @ step, weighted) / (weighted @ step)
-            self._corrected += 1
+            self._corrected, self.latest = self._corrected + 1, self._J
         elif self._J is not None:  # it came along with the residuals
             self._corrected = 0
         return True
@@ -138,4 +143,4 @@ def descend(
                 ended = True
                 break
             walk.renew()
-    return Descent(problem.parameters.to_physical(walk.u), walk.cost, walk.iterations, ended)
+    return Descent(problem.parameters.to_physical(walk.u), walk.cost, walk.iterations, ended, walk.latest)

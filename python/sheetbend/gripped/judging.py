@@ -218,6 +218,8 @@ def predict(
     """Whole recordings, open loop from their first frames; NaN where a motion diverges."""
     if not motions:
         return []
+    if model.late:
+        return predict(replace(model, late=0.0), [m.later(model.late) for m in motions], values, threads)
     if model.beside:
         return _predicted_beside(model, motions, values, threads)
     experiments = [replace(window_of(model, m, None, values), fit=None) for m in motions]

@@ -31,6 +31,7 @@ class Rung:
         small: whether its effect is nearly linear; then it is not tried where one step promises nothing
             (`first_order`).
         beside: whether it moves the recordings onto the rope's axis, beside which the markers sit (`beside`).
+        late: whether it takes the grips as so much earlier as their markers come late (`clock`).
         starts: other values to start from, by option; `EI` as a factor. The end that fits best is taken.
     """
 
@@ -41,6 +42,7 @@ class Rung:
     each_marker: tuple[Parameter, ...] = ()
     small: bool = False
     beside: bool = False
+    late: bool = False
     starts: tuple[Mapping[str, float], ...] = ()
 
     def added_to(self, model: RopeModel) -> RopeModel:
@@ -143,6 +145,7 @@ YIELD = Rung(
     ),
     starts=({"yield_curvature": 1.0, "yield_share": 0.5, "EI": 1.5},),
 )
+CLOCK = Rung("clock of the grips", late=True)
 BESIDE = Rung("markers beside the rope", beside=True)
 SHIFTS = Rung(
     "places of the grips",
@@ -157,4 +160,4 @@ MARKERS = Rung(
     each_marker=(_plain("place_{}", "m", 0.005, 0.005),),
     small=True,
 )
-LADDER = (TWIST, TILTS, REST, VARYING, YIELD, BESIDE, SHIFTS, MARKERS)
+LADDER = (TWIST, TILTS, REST, VARYING, YIELD, CLOCK, BESIDE, SHIFTS, MARKERS)

@@ -39,6 +39,8 @@ class RopeModel:
         beside: (free markers, 2) m, how far each free marker sits beside the rope's axis, about its two directors;
             predictions start from the axis and tell where the markers are. Windows of a fit are of recordings that
             were moved onto the axis.
+        late: s, by which the markers of the grips come after the others; predictions take the grips as so much earlier.
+            Windows of a fit are of motions that do.
         marker_mass: kg of each free marker, beside `density`; spread over the rope it does the same, so that no motion
             tells it.
         segments: links between the grips.
@@ -60,6 +62,7 @@ class RopeModel:
     slid_modes: Sequence[int] = ()
     places: bool = False
     beside: tuple[tuple[float, float], ...] = ()
+    late: float = 0.0
     marker_mass: float = 0.0
     segments: int = 12
     substeps: int = 2

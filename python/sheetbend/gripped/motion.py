@@ -104,6 +104,20 @@ class GrippedMotion:
         recorded[:, free] += by
         return replace(self, recording=replace(self.recording, positions=recorded), positions=x, velocities=v)
 
+    def later(self, by: float) -> GrippedMotion:
+        """The same where the smoothed gripped markers are those of `by` s later: they were recorded late. Beyond the
+        recording they go on as they moved last."""
+        if by == 0.0:
+            return self
+        gripped = np.r_[: self.inner[0] + 1, self.inner[1] : len(self.recording.markers)]
+        times = self.recording.times
+        at = np.clip(times + by, times[0], times[-1])
+        x, v = self.positions.copy(), self.velocities.copy()
+        for kept, given in ((x, self.positions), (v, self.velocities)):
+            kept[:, gripped] = timeseries.interpolate(times, given[:, gripped], at, "cubic", np.inf)
+        x[:, gripped] += v[:, gripped] * (times + by - at)[:, None, None]
+        return replace(self, positions=x, velocities=v)
+
     def directions(self, end: bool) -> Array:
         """(frames, 3) unit directions of a gripped piece, in the rope's direction of travel."""
         k = self.inner[1] if end else self.inner[0] - 1

@@ -195,6 +195,7 @@ def fit_rope(
         if climb.rope is None:
             raise
         interrupted = True
+        climb.gather()
         say(f"interrupted: going back to {next(s.name for s in reversed(climb.steps) if s.stays)}")
     kept = climb.search.whole
     last = everything(kept, spans[-1][0]) if isinstance(windows, str) else spans[-1]
@@ -210,11 +211,12 @@ def fit_rope(
         *usable.notes,
         *doubts(motions, rope.model.gravity),
         *_found_gravity(rope.model, meant),
+        *_found_late(climb.late),
         *climb.search.left_out,
         *at_bounds(rope.parameters, values, rope.model, kept, last[0]),
         *_short_links(rope.model, values),
     )
-    model = replace(rope.model.at(values), beside=climb.beside)
+    model = replace(rope.model.at(values), beside=climb.beside, late=climb.late)
     if density is None:
         result = over_density(found.result)
         found, values = replace(found, result=result), named_over_density(values, result)
@@ -228,6 +230,18 @@ def _found_gravity(model: RopeModel, meant: Sequence[Sequence[float]]) -> list[s
         return []
     along = ", ".join(f"{g:.3g}" for g in model.gravity)
     return [f"no gravity is given; it is taken as [{along}] m/s^2, since the rope sags along it and moves as it asks"]
+
+
+def _found_late(late: float) -> list[str]:
+    """Grips whose markers come late."""
+    if not late:
+        return []
+    when = "after" if late > 0 else "before"
+    taken = "earlier" if late > 0 else "later"
+    return [
+        f"the markers of the grips come {1e3 * abs(late):.3g} ms {when} the others, and the grips are taken as so much "
+        f"{taken}; if one clock stamps all markers, the model lacks something else"
+    ]
 
 
 def _short_links(model: RopeModel, values: Mapping[str, float]) -> list[str]:

@@ -85,6 +85,7 @@ class RopeReport:
             "segments": self.found.model.segments,
             "tangent_stiffness": tangent_stiffness(self.result),
             "model_spread": dict(self.found.spread),
+            "grips_late": self.found.model.late,
             "markers_beside": [list(pair) for pair in self.found.model.beside],
             "steps": steps,
             "trades": [f"{what}: {words}" for what, words in trades(self.result)],

@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import SheetbendError
 from ..minimum.problem import FitProblem
 from .bounds import bounded
+from .carried import slopes_of
 from .descent import Descent, bearable, descend
 from .judging import Split, errors_of, misfits
 from .motion import GrippedMotion
@@ -72,8 +73,11 @@ class Search:
             sound = self.sound(problem, rope.values)
             if sound is None:
                 return None
-            end = descend(sound, most, ENOUGH)
-        return (Rope(rope.model.at(end.values), rope.parameters, end.values), end) if end.finite else None
+            problem, end = sound, descend(sound, most, ENOUGH)
+        if not end.finite:
+            return None
+        slopes = slopes_of(problem, end.jacobian)
+        return Rope(rope.model.at(end.values), rope.parameters, end.values, slopes=slopes), end
 
     def problem(self, rope: Rope, window: Span) -> FitProblem:
         """The least-squares problem of windows of what is fitted, which starts at the rope's values."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ..quantities.parameters import Parameter
+from .carried import Slopes
 from .judging import Errors
 from .ladder import Rung
 from .model import RopeModel
@@ -43,12 +44,13 @@ class Step:
 
 @dataclass(frozen=True)
 class Rope:
-    """A model with its fitted values, what is free in it, and how it predicts."""
+    """A model with its fitted values, what is free in it, how it predicts, and where its fit ended the derivative."""
 
     model: RopeModel
     parameters: Parts
     values: dict[str, float]
     errors: Errors = field(default_factory=Errors.none)
+    slopes: Slopes | None = field(default=None, compare=False)
 
     def without(self, rung: Rung, motion: GrippedMotion) -> Rope:
         """The rope without what a rung added to a fit of such motions."""

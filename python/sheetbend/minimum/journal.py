@@ -310,12 +310,18 @@ class Evaluator:
     def _state(self) -> bytes:
         return self._core.state().tobytes()
 
-    def capsule(self, coordinates: Coordinates) -> object:
-        """The same for Ceres, in the coordinates of a search; the problem must outlive it."""
-        if self._journal is None and not coordinates.charts and isinstance(self._core, _core.Problem):
+    def capsule(self, coordinates: Coordinates, known: tuple[np.ndarray, Timed] | None = None) -> object:
+        """The same for Ceres, in the coordinates of a search; the problem must outlive it.
+
+        Args:
+            known: a point w and the evaluation there with a Jacobian, which is not made again.
+        """
+        if known is None and self._journal is None and not coordinates.charts and isinstance(self._core, _core.Problem):
             return self._core.evaluation()
 
         def evaluated(w: np.ndarray, jacobian: bool) -> Timed:
+            if known is not None and np.array_equal(w, known[0]):
+                return known[1]
             (ok, r, J), seconds = self(coordinates.out(w), jacobian)
             return (ok, r, coordinates.jacobian(J, w) if jacobian and ok else J), seconds
 

@@ -288,7 +288,7 @@ def _ceres_holding(
     out: dict[str, Any] = {}
     try:
         out = ceres.minimize(
-            evaluation=problem.evaluator.capsule(coordinates),
+            evaluation=problem.evaluator.capsule(coordinates, problem.known_at(w)),
             u=w,
             lower=lower,
             upper=upper,

@@ -19,7 +19,7 @@ from ..statistics.layout import Layout
 from . import content
 from .coordinates import Coordinates, sums_of
 from .counts import count
-from .journal import Evaluator
+from .journal import Evaluator, Timed
 from .lifted import Known, lifted
 from .parts import expanded_to, reaching
 from .spread import Spread
@@ -216,6 +216,14 @@ class FitProblem:
         """Take what was evaluated at u past the problem for the last Jacobian; not where corrections go on from it."""
         if not self.estimates_corrections:
             self._last = np.array(u, dtype=float), (True, r, J)
+
+    def known_at(self, w: np.ndarray) -> tuple[np.ndarray, Timed] | None:
+        """The last Jacobian with its point, where that is w (free,) and a search may begin with it: where coordinates
+        are the parameters themselves, and no correction goes on from it."""
+        if self._last is None or self.coordinates.charts or self.estimates_corrections:
+            return None
+        u, found = self._last
+        return (u, (found, self.seconds.get(True))) if np.array_equal(u, w) else None
 
     def cost(self, u: np.ndarray) -> float:
         """Half the sum of squares at u (free,); infinite where the physics has no answer."""

@@ -1,0 +1,64 @@
+"""Grips that are recorded later than the other markers are found, and predictions take them as earlier."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from sheetbend.gripped import GrippedMotion, RopeReport, fit_rope
+from sheetbend.gripped.clock import lateness
+from sheetbend.gripped.judging import predict
+from sheetbend.gripped.ladder import CLOCK, TWIST
+from sheetbend.report.scores import coordinate_error
+from test_gripped_motion import carried_about, model_of
+
+MOTION = GrippedMotion.of(carried_about(), 0.0)
+MODEL = model_of(MOTION, smoothing=0.0)
+LATE = 0.012
+
+
+def recorded(late: float, seed: int = 0, name: str = "seen") -> GrippedMotion:
+    """A recording of the model with noise of 0.3 mm, the grips' markers late by so many s."""
+    (x,) = predict(MODEL, [MOTION], {})
+    gripped = [k for k in range(x.shape[1]) if k not in MOTION.free]
+    x[:, gripped] = MOTION.later(-late).positions[:, gripped]
+    x += 3e-4 * np.random.default_rng(seed).standard_normal(x.shape)
+    return GrippedMotion.of(replace(MOTION.recording, positions=x, name=name), 0.08)
+
+
+@pytest.mark.parametrize("late", [LATE, -LATE, 0.0])
+def test_it_is_found(late: float) -> None:
+    found = lateness(replace(MODEL, smoothing=0.08), [recorded(late, k) for k in range(2)], {})
+    assert found == pytest.approx(late, abs=1.5e-3)
+
+
+def test_later_grips_go_on_beyond_the_recording() -> None:
+    by, moved = 0.015, MOTION.later(0.015)
+    path = MOTION.positions[:, 0]
+    np.testing.assert_allclose(moved.positions[:-2, 0], 0.5 * (path[1:-1] + path[2:]), atol=1e-4)
+    beyond = path[-1] + by * MOTION.velocities[-1, 0]
+    np.testing.assert_allclose(moved.positions[-1, 0], beyond, atol=1e-9)
+    free = list(MOTION.free)
+    np.testing.assert_array_equal(moved.positions[:, free], MOTION.positions[:, free])
+    assert moved.recording is MOTION.recording and MOTION.later(0.0) is MOTION
+
+
+@pytest.fixture(scope="module")
+def unseen() -> GrippedMotion:
+    return recorded(LATE, 9, "unseen")
+
+
+def test_a_fit_predicts_with_earlier_grips_and_says_so(unseen: GrippedMotion) -> None:
+    twist = replace(TWIST, parameters=tuple(p for p in TWIST.parameters if p.name in ("rope_EI", "rope_length")))
+    motions = [recorded(LATE, k, f"{k}") for k in range(4)]
+    spans = ((0.5, 1.0), (1.0, 3.0))
+    found = fit_rope(
+        motions, density=0.06, ladder=(twist, CLOCK), bending_lengths=(0.3,), windows=spans, max_segments=12
+    )
+    assert found.model.late == pytest.approx(LATE, abs=1.5e-3)
+    (bare,) = predict(replace(found.model, late=0.0), [unseen], found.values)
+    error, less = (coordinate_error(unseen.recording, x) for x in (bare, found.predict(unseen)))
+    assert less < 0.5 * error
+    assert any("ms after the others" in words for words in found.warnings)
+    assert RopeReport("arch", found).to_dict()["grips_late"] == found.model.late
