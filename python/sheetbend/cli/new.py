@@ -226,4 +226,4 @@ def _read(file: Path, units: str | None) -> tuple[Recording, str | None]:
                 raise RecordingError(error.field, f"holds {holds}, and no markers over time", error.got, fix) from error
         raise
     doubt = None if units is not None else unit_doubt(recording)
-    return (recording, units) if doubt is None else (Recording.load(file, doubt), doubt)
+    return (recording.mended(), units) if doubt is None else (Recording.load(file, doubt).mended(), doubt)
