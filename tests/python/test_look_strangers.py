@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sheetbend as sb
+from commands import run
 from sheetbend.config import build, parse
 from sheetbend.look import Draft, Take, draft, seen
 
@@ -206,6 +207,23 @@ def test_labels_that_are_exchanged_and_reflections(tmp_path: Path) -> None:
     kind = tomllib.loads(text)["scene"]
     (rope,) = kind.get("rope", kind.get("rod"))
     assert rope["length"] == pytest.approx(1.0, rel=0.01)
+
+
+def test_points_without_names_are_refused_with_where_they_go(tmp_path: Path) -> None:
+    """It was said that 0 of their markers hang together, that an array is missing, or that a time repeats."""
+    rng, t = np.random.default_rng(2), np.arange(30) / RATE
+    points = np.stack([frame[rng.permutation(36)] for frame in shaken(grid(6, 6, 0.1, 0.1), 30)])
+    np.savez(tmp_path / "padded.npz", positions=points, times=t)
+    np.savez(tmp_path / "cloud.npz", points=points.reshape(-1, 3), counts=np.full(30, 36), times=t)
+    rows = [[time, *place] for time, frame in zip(t, points, strict=True) for place in frame]
+    (tmp_path / "cloud.csv").write_text("time,x,y,z\n" + "\n".join(",".join(map(str, row)) for row in rows))
+    for name, words in {
+        "padded.npz": "another order",
+        "cloud.npz": "a point cloud",
+        "cloud.csv": "repeats the time",
+    }.items():
+        result = run("new", tmp_path / name, "-o", tmp_path / "draft.toml")
+        assert result.exit_code == 2 and words in result.output and "loud" in result.output.split(words)[1]
 
 
 @pytest.mark.parametrize("folder", ["twin", "double_pendulum", "cloth_in_wind", "held_cloth", "branched_cable", "beam"])

@@ -14,7 +14,21 @@ BEFORE = 5  # frames, from which a marker is led on
 FORGOTTEN = 0.1  # s, for which a marker is lost at most and still led on
 CLOSER = 0.25  # of the distance to where it is led: how near others come that exchange their labels
 NOISY = 8.0  # times the noise, by which a marker is off at least that has another's label
-FEWEST = 10  # frames
+FEWEST = 10  # frames, and markers, that tell it
+MANY = 200  # frames that tell whether points have names
+ANYWHERE = 0.3  # of the distance to others: how far points without names go from frame to frame at least
+
+
+def shuffled(positions: Array) -> bool:
+    """Whether markers (frames, markers, 3) are points without names: from frame to frame each goes about as far as it
+    is from any other."""
+    x = positions[:MANY]
+    if len(x) < 3 or x.shape[1] < FEWEST:
+        return False
+    step = np.linalg.norm(np.diff(x, axis=0), axis=2)
+    others = np.linalg.norm(x - np.roll(x, x.shape[1] // 2, axis=1), axis=2)
+    known = np.isfinite(step).any() and np.isfinite(others).any()
+    return bool(known and np.nanmedian(step) > ANYWHERE * np.nanmedian(others))
 
 
 def relabeled(t: Array, positions: Array, names: Sequence[str]) -> tuple[Array, list[str]]:
