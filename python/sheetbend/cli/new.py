@@ -21,6 +21,7 @@ from ..look.robot import Poses
 from ..look.seen import seen
 from ..look.take import Measured, Take
 from ..recording.recording import Recording
+from ..recording.relabeled import shuffled
 from ..recording.unit_doubt import unit_doubt
 from .folders import made
 from .gripped import load_ropes
@@ -29,7 +30,12 @@ from .screen import heading, listing
 from .spelling import options
 from .targets import check_targets
 
+CLOUD = (
+    "write a configuration by hand: what holds the cloth from a recording of markers or a robot's poses in `file` and "
+    "[[scene.tool]], and the points as `cloud` in [[recording]] (docs/recordings.md, Point clouds)"
+)
 ELSEWHERE = {
+    "counts": ("a point cloud", CLOUD),
     "quaternions": (
         "poses",
         "write a script, as experiments/tosses and experiments/elbow have one (docs/bodies.md); or make markers of the "
@@ -225,5 +231,8 @@ def _read(file: Path, units: str | None) -> tuple[Recording, str | None]:
             if isinstance(error.got, list) and array in error.got:
                 raise RecordingError(error.field, f"holds {holds}, and no markers over time", error.got, fix) from error
         raise
+    if shuffled(recording.positions):
+        fix = f"save them with sb.Cloud.of(points, times).save('cloud.npz'), and {CLOUD}"
+        raise RecordingError(str(file), "holds points that are in another order in every frame", "a cloud", fix)
     doubt = None if units is not None else unit_doubt(recording)
-    return (recording, units) if doubt is None else (Recording.load(file, doubt), doubt)
+    return (recording.mended(), units) if doubt is None else (Recording.load(file, doubt).mended(), doubt)

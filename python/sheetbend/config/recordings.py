@@ -17,7 +17,7 @@ from ..scene.scene import Scene
 from .schema import RecordingSection
 
 TAKEN = (
-    {"file", "cloud", "name", "frames", "hidden", "fit", "held_out"}  # the recording
+    {"file", "cloud", "mend", "name", "frames", "hidden", "fit", "held_out"}  # the recording
     | {"ropes", "leave_out", "tools", "values", "force", "max_gap", "driven_motion"}  # its scene
     | {"marker", "grids", "offsets"}  # the places of its markers
 )
@@ -54,6 +54,8 @@ def _read(section: RecordingSection, folder: Path, path: str, key: str, name: st
     kind, where = (Cloud, f"{path}.cloud") if key == "cloud" else (Recording, path)
     try:
         recording = kind.load(file, **section.model_dump(include=OF_READER))
+        if section.mend and key == "file":
+            recording = recording.mended()
         if compared and section.frames is not None:
             recording = recording.frames(slice(*section.frames))
         if compared and section.hidden:

@@ -103,6 +103,9 @@ class RecordingSection(Section):
     )
     name: Name | None = key(None, "the file's when left out")
     units: Literal["m", "cm", "mm"] | None = key(None, "length unit of the file; its JSON's when left out")
+    mend: bool = key(
+        False, "put back markers that exchange their labels, and do not use those that are elsewhere for some frames"
+    )
     ropes: list[Name] | None = key(None, "names of the ropes that it shows; all when left out", min_length=1)
     leave_out: list[Name] = key(
         [],

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.timeseries import mean_position
+from ..recording.leaps import elsewhere, leaps, least_leap
 from ..recording.recording import Recording
 from .end_links import EndLink, end_link
 from .lost_frames import on_time
@@ -28,9 +29,6 @@ TURNED = -0.5  # cosine of the angle by which two neighbors turn from frame to f
 STRETCHED = 2.0  # by which their distance changes at most in that
 FORGOTTEN = 0.1  # s, after which directions are not compared any more
 SHORTER = 0.8  # links beside two neighbors, exchanged over given, that exchange them throughout; at an end `end_links`
-JUMP = 0.05  # of the rope's length, from one frame to the next beyond the usual way: no marker of a rope does that
-AWAY = 0.5  # of the larger of two jumps, that their sum is where a marker goes elsewhere and comes back
-SUDDEN = 200.0  # m/s^2, the same for frames that are far apart in time
 REPEATS, LASTS = 5, 0.05  # frames and s of equal numbers that count as frozen
 STEP = 5e-3  # m, that a frozen marker goes at once before or after
 HELD = 10  # more such times: then the file was made from fewer frames, and nothing froze
@@ -57,7 +55,7 @@ def mended(
     frozen = np.stack([_frozen(times, positions[:, k]) for k in tracks], axis=1) & ~_resting(positions)[:, None]
     frozen |= _stopped(times, positions)[:, None]
     positions[frozen] = np.nan
-    stray = np.stack([_elsewhere(times, positions[:, k], least) for k in tracks], axis=1)
+    stray = np.stack([elsewhere(times, positions[:, k], least) for k in tracks], axis=1)
     positions[stray] = np.nan
     words += _each(recording, frozen, "stood still although the rope moved")
     words += _each(recording, stray, "jumped elsewhere")
@@ -110,19 +108,9 @@ def _turned(times: Array, first: Array, second: Array, least: float) -> Mask:
         ((d[1:] * d[:-1]).sum(axis=1) < TURNED)
         & (np.abs(np.diff(np.log(distance))) < np.log(STRETCHED))
         & (np.diff(times[seen]) <= FORGOTTEN)
-        & (np.linalg.norm(_leaps(times[seen], middle[seen]), axis=1) <= least)
+        & (np.linalg.norm(leaps(times[seen], middle[seen]), axis=1) <= least)
     )
     return np.asarray(np.cumsum(turned) % 2 == 1)
-
-
-def _leaps(times: Array, track: Array) -> Array:
-    """(frames - 1, 3) by how much each step of a track (frames, 3) goes beyond its usual way."""
-    apart = np.diff(times)[:, None]
-    if not len(apart):
-        return np.zeros((0, 3))
-    velocity = np.diff(track, axis=0) / apart
-    usual = np.median(np.lib.stride_tricks.sliding_window_view(np.pad(velocity, ((2, 2), (0, 0)), "edge"), 5, 0), -1)
-    return np.asarray((velocity - usual) * apart)
 
 
 def _throughout(positions: Array, inner: tuple[int, int], usual: Array | None) -> tuple[list[int], dict[int, EndLink]]:
@@ -225,46 +213,7 @@ def _least_jump(times: Array, positions: Array) -> float:
     """m, between two frames, that no marker makes."""
     chords = np.linalg.norm(np.diff(positions, axis=1), axis=2)
     length = float(np.nansum(mean_position(chords)))
-    return max(JUMP * length, SUDDEN * float(np.median(np.diff(times))) ** 2)
-
-
-def _elsewhere(times: Array, track: Array, least: float) -> Mask:
-    """(frames,) where a marker (frames, 3) is not on the path that its longest stretch without jumps belongs to."""
-    seen = np.flatnonzero(np.isfinite(track[:, 0]))
-    stray = np.zeros(len(times), dtype=bool)
-    if len(seen) < 6:
-        return stray
-    x, t = track[seen], times[seen]
-    leaps, speed = _leaps(t, x), np.linalg.norm(np.diff(x, axis=0), axis=1) / np.diff(t)
-    bounds = [0, *(np.flatnonzero(np.linalg.norm(leaps, axis=1) > least) + 1).tolist(), len(seen)]
-    stretches = list(pairwise(bounds))
-    best = max(range(len(stretches)), key=lambda i: stretches[i][1] - stretches[i][0])
-    fastest = float(speed[stretches[best][0] : stretches[best][1] - 1].max(initial=0.0))
-
-    def reached(a: int, b: int) -> bool:
-        return bool(np.linalg.norm(x[a] - x[b]) <= least + fastest * abs(t[a] - t[b]))
-
-    def returned(a: int, b: int) -> bool:
-        """Whether the jump into a stretch and the one out of it cancel: no rope makes either."""
-        if a == 0 or b == len(seen):
-            return False
-        there, back = leaps[a - 1], leaps[b - 1]
-        return bool(np.linalg.norm(there + back) < AWAY * max(np.linalg.norm(there), np.linalg.norm(back)))
-
-    first, last = stretches[best]
-    good = [stretches[best]]
-    for a, b in stretches[best + 1 :]:
-        if reached(last - 1, a) and not returned(a, b):
-            last = b
-            good.append((a, b))
-    for a, b in reversed(stretches[:best]):
-        if reached(first, b - 1) and not returned(a, b):
-            first = a
-            good.append((a, b))
-    stray[seen] = True
-    for a, b in good:
-        stray[seen[a:b]] = False
-    return stray
+    return least_leap(times, length)
 
 
 def _runs(same: Mask) -> Iterator[tuple[int, int]]:

@@ -156,8 +156,7 @@ def _lines(take: Take, tip: tuple[int, ...], beam: Beam, measured: Measured) -> 
     if beam.resting is not None:
         still: dict[str, Any] = {
             "name": "rest",
-            "file": take.file,
-            "units": take.units,
+            **take.reading,
             "leave_out": ["pull"],
             "static": True,
         }
@@ -182,7 +181,7 @@ def _lines(take: Take, tip: tuple[int, ...], beam: Beam, measured: Measured) -> 
 def _swing(take: Take, beam: Beam) -> dict[str, Any]:
     stop = beam.start + FITTED / beam.frequency
     last = min(stop + PREDICTED / beam.frequency, float(take.seen.recording.times[-1]))
-    entries: dict[str, Any] = {"file": take.file, "units": take.units, "start": "equilibrium"}
+    entries: dict[str, Any] = {**take.reading, "start": "equilibrium"}
     return entries | {"start_time": beam.start, "fit": [beam.start, stop], "held_out": [stop, last]}
 
 

@@ -41,6 +41,18 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     s = takes[0].seen
     if not s.sheet:
         return None
+    if s.up_by == "guess":
+        turned = replace(s, up=3 - s.up)
+        for guess in (s, turned):  # a cloth does not stand on the edge that holds it
+            found = _described([replace(takes[0], seen=guess), *takes[1:]], measured, stands=False)
+            if found is not None:
+                return found._replace(up=None if guess is s else guess.up)
+    return _described(takes, measured, stands=True)
+
+
+def _described(takes: Sequence[Take], measured: Measured, stands: bool) -> Description | None:
+    """The same; None where a cloth stands on an edge that rests, and may not."""
+    s = takes[0].seen
     names = s.recording.markers
     density = 0.2 if measured.density is None else measured.density
     cloths, others = cloth_parts(s)
@@ -61,6 +73,8 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         if sheet is None:
             unknown.append(lies_over(names, own, "the middle of their cloth is above two of its sides"))
             continue
+        if not stands and any(hold.side == "bottom" and hold.own and not hold.moves for hold in sheet.held):
+            return None
         sheets.append(sheet)
     pairs = folded(s, [(sheet.own, sheet.flat) for sheet in sheets])
     sides = {k for pair in pairs for k in pair}
@@ -325,7 +339,7 @@ def _sizes(sheet: Sheet) -> tuple[str, ...]:
 
 def _recording(take: Take, ride: robot.Riding | None) -> dict[str, Any]:
     s, r = take.seen, take.seen.recording
-    entries: dict[str, Any] = {"file": take.file, "units": take.units}
+    entries: dict[str, Any] = dict(take.reading)
     if s.static:
         return entries | {"static": True, "sigma": max(s.noise, 1e-3 * float(np.nanmax(s.apart)))}
     start, stop = float(r.times[0]), float(r.times[-1])

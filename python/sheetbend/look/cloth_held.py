@@ -15,6 +15,7 @@ from .sheet import laid, spacing
 
 Array = np.ndarray
 QUIET = 0.1  # of the motion of all: how little a row moves where the edge beyond it is held
+STAYS = 0.3  # of the motion of all, and of any other side: how little the row moves that is next to a held edge
 SAGS = 0.03  # of its length: by so much a row of markers hangs below its ends where only these are held
 HANGS = 0.4  # of its length: a cloth of which one end is so much higher than the other is not level
 AROUND = 6  # markers next to a holder show how the cloth lies there
@@ -164,9 +165,17 @@ def holds(
 
 
 def _at_rest(s: Seen, own: list[int], flat: Array, apart: float) -> tuple[str, ...]:
-    """The one side whose outer row stays where it is while the others move, as that of a flag; else none."""
-    resting = tuple(side for side in SIDES if {own[k] for k in row_of(flat, side, apart)} <= set(s.still))
-    return resting if len(resting) == 1 else ()
+    """The one side whose outer row stays where it is while the others move, as that of a flag, or moves far less than
+    theirs, as beside a pole; else none."""
+    x = s.recording.positions[:, own]
+    rows = {side: row_of(flat, side, apart) for side in SIDES}
+    resting = tuple(side for side, row in rows.items() if {own[k] for k in row} <= set(s.still))
+    if len(resting) == 1 or s.static:
+        return resting if len(resting) == 1 else ()
+    (side, least), (_, following), *_ = sorted(
+        ((side, motion(x[:, row])) for side, row in rows.items()), key=lambda found: found[1]
+    )
+    return (side,) if least < STAYS * min(motion(x), following) else ()
 
 
 def _on_bars(

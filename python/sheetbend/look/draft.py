@@ -98,6 +98,8 @@ def _told(takes: Sequence[Take], up: int | None) -> list[str]:
             + (f", {lost:.2%} of the samples not seen" if lost else "")
             + (f", noise {1e3 * take.seen.noise:.2g} mm in each coordinate" if take.seen.noise else "")
         )
+        mended = r.metadata.get("mended", [])
+        said += mended if isinstance(mended, list) else []
     first = takes[0].seen
     pieces = first.recording.metadata.get("joined", {})
     if isinstance(pieces, dict) and pieces:
@@ -114,7 +116,7 @@ def _told(takes: Sequence[Take], up: int | None) -> list[str]:
     if takes[0].units is not None:
         said.append(f"lengths are taken as {takes[0].units}")
     if first.up_by == "guess" and up is not None:
-        said.append(f"{'xyz'[up]} points up: gravity accelerates the markers along it")
+        said.append(f"{'xyz'[up]} points up, as the motion shows")
     elif first.up_by == "guess":
         axis = "xyz"[first.up]
         said.append(

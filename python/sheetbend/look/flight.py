@@ -170,7 +170,7 @@ def _lines(take: Take, flight: Flight, reach: float) -> list[str]:
     for name, point in zip(r.markers, flight.points, strict=True):
         lines += table("[[marker]]", {"marker": name, "body": "body", "point": point.tolist()})
     cut = float(t[round(FITTED * (len(t) - 1))] + 0.5 * step)
-    own: dict[str, Any] = {"file": take.file, "units": take.units, "start_time": float(t[0])}
+    own: dict[str, Any] = {**take.reading, "start_time": float(t[0])}
     own |= {"fit": [float(t[0]), cut], "held_out": [cut, float(t[-1]) + 1e-4], "sigma": max(s.noise, 1e-5)}
     lines += table("[[recording]]", own, {"held_out": "predicted, not fitted"})
     for of in ("", "turn_", "velocity_", "spin_"):

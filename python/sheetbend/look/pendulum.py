@@ -188,12 +188,11 @@ def _pieces(s: Seen, take: Take, arms: int) -> list[tuple[dict[str, Any], float]
         predicted = [rest + k * room for k in range(PREDICTED)]
     found: list[tuple[dict[str, Any], float]] = []
     for k, a in enumerate(fitted):
-        found.append(({"file": take.file, "units": take.units, "name": f"fitted_{k}", "fit": [a, a + length]}, a))
+        found.append(({**take.reading, "name": f"fitted_{k}", "fit": [a, a + length]}, a))
     for k, a in enumerate(round(a, 4) for a in predicted):
         held = [a + LEAD + 1e-3, min(a + min(room, most), stop)]
         entries = {
-            "file": take.file,
-            "units": take.units,
+            **take.reading,
             "name": f"predicted_{k}",
             "predict": "window",
             "fit": [a, a + LEAD],

@@ -357,7 +357,7 @@ def _straight(s: Seen, order: tuple[int, ...]) -> list[float] | None:
 
 def _recording(take: Take, flat: list[float] | None, finds_rest: bool) -> dict[str, Any]:
     s, r = take.seen, take.seen.recording
-    entries: dict[str, Any] = {"file": take.file, "units": take.units}
+    entries: dict[str, Any] = dict(take.reading)
     if s.static:
         axes = "".join(axis for k, axis in enumerate("xyz") if flat is None or abs(flat[k]) < 0.99)
         return entries | {"static": True, "sigma": max(s.noise, 0.007 * float(np.nanmax(s.apart))), "axes": axes}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,12 @@ class Take:
     seen: Seen
     file: str
     units: str | None = None
+
+    @property
+    def reading(self) -> dict[str, Any]:
+        """Keys of [[recording]] that say how the file is read."""
+        mended = "mended" in self.seen.recording.metadata
+        return {"file": self.file, "units": self.units, "mend": True if mended else None}
 
 
 @dataclass(frozen=True)

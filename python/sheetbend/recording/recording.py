@@ -19,6 +19,7 @@ from . import io
 from .marker_data import MarkerData, read_only
 from .of_poses import markers_of_poses
 from .recording_checks import checked_times, choose_from, marker_indices
+from .relabeled import relabeled
 
 _SAME_TIME = 1e-9  # s: decimal bounds such as 0.66 must find the frame stored as 0.6600000000000001
 
@@ -243,6 +244,12 @@ class Recording(MarkerData):
         positions = self.positions.copy()
         positions[:, self.clamped] = closed
         return self._derive(positions=positions)
+
+    def mended(self) -> Recording:
+        """Markers that exchange their labels are put back, and those that are elsewhere for some frames not seen there.
+        metadata["mended"] lists what was done; the same object where nothing was wrong."""
+        positions, said = relabeled(self.times, self.positions, self.markers)
+        return self._derive(positions=positions, metadata={**self.metadata, "mended": said}) if said else self
 
     def noise(self) -> Array:
         """(markers,) m: noise of one coordinate, a robust high-frequency residual (`timeseries.noise`)."""

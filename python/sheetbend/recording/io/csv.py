@@ -163,6 +163,9 @@ def _read_long(path: Path, header: list[str], rows: list[Row], times: Array) -> 
 def _check_times(path: Path, rows: list[Row], times: Array) -> None:
     previous = -np.inf
     for (line, cells), time in zip(rows, times, strict=True):
+        if time == previous and len(cells) == 4:
+            fix = "name the marker of each row in a column marker; save points without names with sb.Cloud.of(...)"
+            refuse(path, line, "repeats the time of the row before", cells[0], fix)
         if not time > previous:
             refuse(path, line, "must have a time later than the row before", cells[0] or "an empty cell")
         previous = time
