@@ -353,14 +353,20 @@ class TestRefusals:
             Journal(path)
         assert path.read_text() == "notes " * 1000
 
+    def test_a_damaged_list_of_tables(self, path: Path) -> None:
+        """What SQLite says of it is no text: a UnicodeDecodeError."""
+        Journal(path).close()
+        path.write_bytes(path.read_bytes().replace(b"TABLE about", b"T\xffBLE about"))
+        with pytest.raises(sb.InputError, match="cannot be used"):
+            Journal(path)
+
     def test_what_has_other_tables(self, path: Path) -> None:
         """A view without an end took all of the time that there is."""
         Journal(path).close()
-        endless = (
-            "WITH RECURSIVE n(k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n) SELECT k AS key, k AS jacobian FROM n"
-        )
+        endless = "WITH RECURSIVE n(k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n)"
         with closing(sqlite3.connect(path)) as opened:
-            opened.executescript(f"DROP TABLE evaluation; CREATE VIEW evaluation AS {endless} FROM n")
+            view = f"{endless} SELECT k AS key, k AS jacobian FROM n"
+            opened.executescript(f"DROP TABLE evaluation; CREATE VIEW evaluation AS {view}")
         with pytest.raises(sb.InputError, match="cannot be used: it has other tables than a journal"):
             Journal(path)
 

@@ -9,7 +9,7 @@ import pytest
 import sheetbend as sb
 from sheetbend.doubts.directions import EXPLAINS, LEVEL, asked_for
 from sheetbend.doubts.held_losses import held_losses
-from sheetbend.doubts.missing_loss import of_more_loss
+from sheetbend.doubts.missing_loss import missing_loss, of_more_loss
 from sheetbend.doubts.other_losses import other_losses
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.optimizers import minimize
@@ -180,6 +180,36 @@ def test_another_error_of_the_model_is_not_taken_for_a_loss() -> None:
     found = fitted(replace(e, scene=turned), "rope_EI", "rope_drag_linear")
     assert found.result.misfit is not None and found.result.misfit.reduced_chi_square > 100
     assert not any("energy" in one.words for one in found.result.estimates)
+
+
+def test_a_coarse_mesh_is_not_taken_for_a_loss() -> None:
+    """20 links under a hand; data of 120. A damping explains 53 % of what is left, and no mesh was asked."""
+    times = np.arange(151) / 100
+    ease = np.clip(times / 0.3, 0.0, 1.0)
+    path = np.array([0.08, 0.05, 0.02]) * np.sin(2 * np.pi * np.array([1.1, 1.6, 0.9]) * times[:, None])
+    path *= (ease**2 * (3 - 2 * ease))[:, None]
+
+    def made(links: int, recording: sb.Recording | None, share: float) -> sb.Experiment:
+        losses = {"bend_damping": 0.02 * share, "drag_linear": 0.02 * share}
+        down = {"direction": (0, 0, -1), "pinned": ()}
+        scene = sb.rope(0.5, links, density=0.05, EI=1e-3 * share, **losses, **down)
+        rope = scene.ropes["rope"]
+        scene.drive(rope.particles[:1], times, scene.positions[rope.particles[:1]] + path[:, None])
+        places = [sb.on_rope(rope, 0.5 * (k + 1) / 6) for k in range(6)]
+        recording = recording or sb.Recording(positions=np.zeros((151, 6, 3)), times=times)
+        return sb.Experiment(scene=scene, recording=recording, markers=places, solver=sb.Solver(h=1 / 300), sigma=5e-4)
+
+    fine = replace(made(120, None, 1.0), solver=sb.Solver(h=1 / 1200))
+    seen = FitProblem([fine], as_parameters(["rope_EI"], [fine])).simulate(np.log([1e-3]))[0]
+    noise = 5e-4 * np.random.default_rng(1000).standard_normal(seen.shape)
+    recording = sb.Recording(positions=seen + noise, times=times, name="swung")
+    e = made(20, recording, 1.3)
+    names = ("rope_EI", "rope_bend_damping", "rope_drag_linear")
+    problem = FitProblem([e], as_parameters(names, [e]))
+    u = minimize(problem, problem.parameters.initial())[0].u
+    finer = sb.Refinement(finer=lambda: [made(40, recording, 1.3)])
+    assert set(missing_loss(problem, u, (problem, u))) == set(names)
+    assert missing_loss(problem, u, (problem, u), refinement=finer) == {}
 
 
 def test_what_stands_still_loses_nothing() -> None:

@@ -51,6 +51,12 @@ def placed(shift: float, one: int | None = None) -> sb.Experiment:
     return replace(e, markers=[sb.on_rope(line, float(at)) for at in s])
 
 
+def beside(by: float) -> sb.Experiment:
+    """Markers that are told to stand off the rope, in the plane of its motion."""
+    e = fall(rope())
+    return replace(e, markers=[place.with_offset((0.0, 0.0, by)) for place in placed(0.0).places if place])
+
+
 def moved(by: tuple[float, float, float], size: float = 1.0) -> sb.Experiment:
     """A recording in another frame."""
     e = fall(rope())
@@ -69,6 +75,7 @@ CASES: dict[str, tuple[Any, str]] = {
     "twice": (lambda: timed(late=-0.01, first=40), "fall had twice 1 of its frames before 0.4 s"),
     "clock": (lambda: timed(1.003), "the times of the recording were 0.3 % too long"),
     "places": (lambda: placed(-0.003), "all markers sat 3 mm farther along the material"),
+    "beside": (lambda: beside(0.003), "stood 3 mm off the axis of the rope, at right angles to it and to"),
     "place": (lambda: placed(0.005, 1), "marker m1 sat 5 mm less far along the material"),
 }
 

@@ -78,7 +78,8 @@ def between_parts(
 
     Args:
         refinement: of the discretization; where parts differ, one simulation each tells what it explains of that.
-            Where it widens an interval more than noise does, they differ for that reason alone, and it is asked first.
+            Parts must differ with and without it. Where it widens an interval more than noise does, they mostly do
+            without, and it is asked first.
     """
     coarse = refinement is not None and any(e.discretization > (e.statistical or 0.0) for e in judged.estimates)
     words = {} if coarse else _between(problem, u, judged, [])
@@ -86,7 +87,8 @@ def between_parts(
         return {}
     shifts = residual_shifts(problem, u, refinement) if refinement is not None else []
     errors = driven_errors(problem, u)
-    return _between(problem, u, judged, shifts, errors) if coarse or shifts or errors.size else words
+    found = _between(problem, u, judged, shifts, errors) if coarse or shifts or errors.size else words
+    return {} if coarse and found and not _between(problem, u, judged, []) else found
 
 
 def _between(

@@ -7,7 +7,7 @@ beyond noise, and more than chance explains.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,15 +59,25 @@ class Score:
     chance: float
 
 
-def clearly(problem: FitProblem, u: Array, column: Array, mine: Array, tests: int) -> Asked | None:
+def clearly(
+    problem: FitProblem, u: Array, column: Array, mine: Array, tests: int, shifts: Callable[[], list[Array]]
+) -> Asked | None:
     """`asked_for` at a minimum u (free,), if it explains a third of what some rows leave and chance does not, of so
-    many tests. What noise of what drives the scenes does to the residuals counts as chance."""
+    many tests. What noise of what drives the scenes does to the residuals counts as chance, and what a finer mesh
+    changes of those of the data, which `shifts` tells, is taken out: on a coarse mesh right models asked for a
+    damping."""
     _, r, J = problem.evaluate(u)
     layout, taken = problem.rows_layout(), sum(map(problem.core.absorbed, range(len(problem.experiments))))
     column = np.where(mine, column, 0.0)
     asked = asked_for(r, J, column, mine, layout, taken)
     if asked is None or not (asked.explained > EXPLAINS and asked.chance < LEVEL / tests):
         return None
+    if changed := shifts():
+        columns = np.column_stack(changed)
+        J = np.hstack([J, np.vstack([columns, np.zeros((len(r) - len(columns), columns.shape[1]))])])
+        asked = asked_for(r, J, column, mine, layout, taken)
+        if asked is None or not (asked.explained > EXPLAINS and asked.chance < LEVEL / tests):
+            return None
     errors = driven_errors(problem, u, FEW)
     if errors.size:
         asked = asked_for(r, J, column, mine, layout, taken, errors)

@@ -9,7 +9,7 @@ Philosophical Society 44, 50).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -27,12 +27,18 @@ from .more_parameters import with_parameter
 HELD: dict[str, Any] = {"fixed": True, "log": False, "prior": None, "lower": -math.inf, "upper": math.inf}
 
 
-def held_losses(problem: FitProblem, u: Array, known: Mapping[str, float] | None = None) -> dict[str, str]:
+def held_losses(
+    problem: FitProblem,
+    u: Array,
+    known: Mapping[str, float] | None = None,
+    shifts: Callable[[], list[Array]] = list,
+) -> dict[str, str]:
     """By free parameter, the given loss of its motion that the residuals ask another size of. One Jacobian.
 
     Args:
         u: (free,) the minimum.
         known: by parameter, the share of what the fit leaves that has another cause. A loss must explain more.
+        shifts: see `clearly`.
     """
     ok, _, J = problem.evaluate(u)
     names = held_names(problem)
@@ -43,7 +49,7 @@ def held_losses(problem: FitProblem, u: Array, known: Mapping[str, float] | None
     found: dict[str, str] = {}
     for group in groups:
         mine = rows_of(problem, group)
-        asked = {name: clearly(problem, u, g, mine, len(groups) * len(names)) for name, g in columns.items()}
+        asked = {name: clearly(problem, u, g, mine, len(groups) * len(names), shifts) for name, g in columns.items()}
         told = {name: one for name, one in asked.items() if one is not None}
         if told:
             name = max(told, key=lambda name: told[name].explained)

@@ -15,16 +15,19 @@ States of motions in windows follow by one Gauss-Newton step, which is their fir
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cache
 from typing import Literal
 
 import numpy as np
 
 from ..arrays.timeseries import Array
 from ..experiment.cut import in_steps
+from ..minimum.discretization import Refinement
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
+from .contradictions import residual_shifts
 from .directions import Asked, clearly, rows_of, tied
 from .held_losses import held_losses
 from .other_losses import other_losses
@@ -33,7 +36,11 @@ OTHER: dict[str, Literal["bdf1", "bdf2"]] = {"bdf1": "bdf2", "bdf2": "bdf1"}
 
 
 def missing_loss(
-    problem: FitProblem, u: Array, fitted: tuple[FitProblem, Array], known: Mapping[str, float] | None = None
+    problem: FitProblem,
+    u: Array,
+    fitted: tuple[FitProblem, Array],
+    known: Mapping[str, float] | None = None,
+    refinement: Refinement | None = None,
 ) -> dict[str, str]:
     """By free parameter, the motion whose losses the model does not have, or does not have so large.
 
@@ -47,20 +54,31 @@ def missing_loss(
         u: (free,) its minimum.
         fitted: the problem as it was fitted, whose rows are the same, and its minimum.
         known: by parameter, the share of what the fit leaves that has another cause. A loss must explain more.
+        refinement: of the discretization; where a loss is asked for, a simulation tells what a finer mesh explains. (A
+            shorter step changes losses, too: it is not asked.)
     """
+
+    @cache
+    def shifts() -> list[Array]:
+        return [] if refinement is None else residual_shifts(problem, u, replace(refinement, halve_step=False))
+
     if all(e.static for e in problem.experiments):
         return {}
-    found = held_losses(problem, u, known or {})
+    found = held_losses(problem, u, known or {}, shifts)
     found |= {
         name: words
-        for name, words in _by_other_integrator(problem, u, fitted, known or {}).items()
+        for name, words in _by_other_integrator(problem, u, fitted, known or {}, shifts).items()
         if name not in found
     }
     return found or ({} if known else other_losses(*fitted))
 
 
 def _by_other_integrator(
-    problem: FitProblem, u: Array, fitted: tuple[FitProblem, Array], known: Mapping[str, float]
+    problem: FitProblem,
+    u: Array,
+    fitted: tuple[FitProblem, Array],
+    known: Mapping[str, float],
+    shifts: Callable[[], list[Array]],
 ) -> dict[str, str]:
     if any(e.scene.compiled.contacts or e.scene.compiled.touches_itself for e in problem.experiments):
         return {}
@@ -72,7 +90,7 @@ def _by_other_integrator(
     found: dict[str, str] = {}
     for group in groups:
         mine = rows_of(problem, group)
-        asked = clearly(problem, u, change, mine, len(groups))
+        asked = clearly(problem, u, change, mine, len(groups), shifts)
         if asked is not None:
             words = _words([problem.experiments[i].name for i in group], asked)
             names = [name for i in group for name in problem.acting_on(problem.experiments[i])]

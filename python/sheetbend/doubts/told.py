@@ -44,13 +44,14 @@ GROUPS: Mapping[str, tuple[str, tuple[float, str]]] = {
     "recording_size": ("", (5e-3, "0.5 %")),
     "drive_size": ("", (0.01, "1 %")),
     "drive_place": ("m", STEPS["m"]),
+    "marker_offset": ("m", STEPS["m"]),
     "marker_mass": ("kg", (MOST_EACH, f"{short(1e3 * MOST_EACH)} g each")),
 }
 """Told numbers that are no quantities, by the name under which a standard deviation is given: unit (none of what is
 relative) and step."""
 SIZE, LATER, SLOWER, LARGER = "size of gravity", "frames later", "clock", "size of the recording"
 FARTHER, ASIDE = "path of what drives the scene", "place of what drives the scene"
-WEIGHTS = "mass of each marker"
+WEIGHTS, BESIDE = "mass of each marker", "offset of markers"
 _NONE = np.zeros(0)
 
 
@@ -246,6 +247,8 @@ def _observe(
                 mine = np.zeros(problem.core.first_rows[i + 1] - problem.core.first_rows[i], dtype=bool)
                 mine[own] = marker == m
                 yield replace(whole, label=f"{name} {k}", column=whole.column[marker == m], rows=mine, marker=name)
+    for axis in range(3) if count == 1 else ():  # of ropes
+        yield change(f"{BESIDE} {AXES[axis]}", "marker_offset", np.cross(moves[0], np.eye(3)[axis]))
     held, boundary = sorted(e.scene.pinned, key=e.scene.places_of), e.scene.boundary
     if not e.static and e.time_offset is None and len(r.times) > 1 and not boundary.following:
         speed = np.gradient(shown, r.times, axis=0)

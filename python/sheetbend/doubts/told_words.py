@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
-from .told import ASIDE, DEGREE, FARTHER, LARGER, LATER, MILLIMETER, SIZE, SLOWER, Told
+from .told import ASIDE, BESIDE, DEGREE, FARTHER, LARGER, LATER, MILLIMETER, SIZE, SLOWER, Told
 
 
 def words_of(one: Told, more: float, problem: FitProblem, group: Sequence[int]) -> str:
@@ -38,6 +38,9 @@ def words_of(one: Told, more: float, problem: FitProblem, group: Sequence[int]) 
         return f"the clamps{of} and all with them were turned by {short(abs(more) / DEGREE, 2)} degrees about {axis}"
     if one.label.startswith(ASIDE):
         return f"what drives the scene{of} was {short(abs(more) / MILLIMETER, 2)} mm farther along {axis}"
+    if one.label.startswith(BESIDE):
+        off = short(abs(more) / MILLIMETER, 2)
+        return f"all markers{of} stood {off} mm off the axis of the rope, at right angles to it and to {axis}"
     if one.name == "clamps":
         return f"the clamps{of} and all with them stood {short(abs(more) / MILLIMETER, 2)} mm farther along {axis}"
     if one.name == "markers":

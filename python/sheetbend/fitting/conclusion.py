@@ -142,7 +142,7 @@ def _doubts(
     warnings += undecided
     lacking = (
         doubts_of(at.problem, at.u, judged, wrong),
-        missing_loss(at.problem, at.u, fitted, explained_by(at.problem, wrong)),
+        missing_loss(at.problem, at.u, fitted, explained_by(at.problem, wrong), refinement),
         missing_force(at.problem, at.u, judged),
         spin,
         unstable_rests(*fitted),

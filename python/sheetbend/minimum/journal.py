@@ -44,6 +44,8 @@ TABLES = (
     "state BLOB)",
 )
 
+FAULTS = (sqlite3.Error, UnicodeError)  # the second where SQLite tells of bytes that are no text
+
 Evaluation = tuple[bool, np.ndarray, np.ndarray]  # ok, residuals (rows,), Jacobian (rows, free) or (0, free)
 Timed = tuple[Evaluation, float | None]  # with the seconds that it took when it was made, where they are known
 _current: ContextVar[Journal | None] = ContextVar("journal", default=None)
@@ -108,7 +110,7 @@ class Journal(AbstractContextManager["Journal"]):
             except BaseException:
                 self._db.close()
                 raise
-        except sqlite3.Error as error:
+        except FAULTS as error:
             fix = "give a file that can be written and that no other process uses, or remove it"
             raise InputError("journal", f"cannot be used: {error}", str(self.path), fix) from error
         self._known: dict[bytes, bool] = {key: bool(jacobian) for key, jacobian in kept}  # whether with a Jacobian
@@ -138,7 +140,7 @@ class Journal(AbstractContextManager["Journal"]):
             try:
                 if self._db.in_transaction and not self._finished and not self.trouble:
                     self._db.execute("COMMIT")
-            except sqlite3.Error as error:
+            except FAULTS as error:
                 self._stop(error)
             finally:
                 self._db.close()
@@ -156,7 +158,7 @@ class Journal(AbstractContextManager["Journal"]):
             if not self._problem_known and not self.trouble:
                 try:
                     self._expect("problem", made_from)
-                except sqlite3.Error as error:
+                except FAULTS as error:
                     self._stop(error)
                 self._problem_known = True
         return content.digest(made_from).encode()
@@ -200,7 +202,7 @@ class Journal(AbstractContextManager["Journal"]):
         with self._lock:
             try:
                 row = self._db.execute(f"SELECT {columns}, state FROM evaluation WHERE key = ?", (key,)).fetchone()
-            except sqlite3.Error as error:
+            except FAULTS as error:
                 self._stop(error)
                 return None
         try:
@@ -242,7 +244,7 @@ class Journal(AbstractContextManager["Journal"]):
                 if time.monotonic() - self._committed >= COMMIT_SECONDS:
                     self._db.execute("COMMIT")
                     self._committed = time.monotonic()
-            except (sqlite3.Error, OSError) as error:
+            except (*FAULTS, OSError) as error:
                 self._stop(error)
 
     def _expect(self, part: str, texts: Mapping[str, str]) -> None:
