@@ -25,6 +25,8 @@ OTHERWISE = {
     "first_table_contact_dissipation": (0.7, 1.4),
     "rounding": (0.3, 2.0),
     "hinge_viscosity": (0.1, 4.0),
+    "hinge_tilt_stiffness": (0.6, 1.6),
+    "hinge_tilt_damping": (0.3, 3.0),
     "first_inertia": (0.9, 1.1),
 }
 

@@ -30,10 +30,12 @@ BLOCKS = ("first", "second")
 BOX = dict(enumerate(np.diag(sb.Inertia.box(MASS, SIDES / SCALE).matrix).tolist(), start=1))  # kg m^2, homogeneous
 STIFFNESS = 2.5e5  # N/m, of a corner
 FOUND = {  # of the first block, and alike of the second; moments of inertia and viscosity from flights between impacts
-    "first_table_friction": 0.17,
-    "first_table_contact_dissipation": 1.0,  # s/m
+    "first_table_friction": 0.2,
+    "first_table_contact_dissipation": 0.33,  # s/m
     "rounding": 3e-4,  # m
     "hinge_viscosity": 4e-4,  # N m s
+    "hinge_tilt_stiffness": 85.0,  # N m/rad
+    "hinge_tilt_damping": 0.06,  # N m s/rad
     **{f"first_inertia_{k}": ratio * BOX[k] for k, ratio in zip(BOX, (1.44, 1.20, 1.33), strict=True)},
 }
 
@@ -106,7 +108,16 @@ def scene_of(toss: Toss, height: float = 0.0) -> sb.Scene:
     centers, turned = second_block(at[None], frame[None], np.array([start.angle]))
     first = scene.add_body("first", of=box, **start.body)
     second = scene.add_body("second", of=box, at=centers[0], rotation=turned[0])
-    sb.hinge(first, second, at=at + frame @ HINGE, axis=frame @ AXIS, rate=start.rate, viscosity=1e-4)
+    sb.hinge(
+        first,
+        second,
+        at=at + frame @ HINGE,
+        axis=frame @ AXIS,
+        rate=start.rate,
+        viscosity=1e-4,
+        tilt_stiffness=85.0,
+        tilt_damping=0.06,
+    )
     table = sb.Plane(name="table", point=(0.0, 0.0, height))
     for body in (first, second):
         name = f"{body.name}_table"

@@ -1,11 +1,10 @@
 """What tosses tell of two blocks on a hinge: a fit to their flights, also those between impacts, which finds moments of
-inertia and the viscosity of the hinge, a fit to the first frames after contact, and a search over whole paths.
+inertia and the viscosity of the hinge, a fit to the first frames after contact, and a search over the first 40.
 
     python experiments/elbow/block_landings_study.py [flights | fit | search]
 
 All see every other toss; the last two those of them that have seven frames of free flight or more. Each takes one to
-two minutes of processor time. `block_landings.py` has the numbers of the first, and friction, dissipation and rounding
-with which whole paths are predicted best.
+two minutes of processor time. `block_landings.py` has the numbers of the first and the last.
 """
 
 from __future__ import annotations
@@ -22,13 +21,15 @@ from block_landings import (
     BOX,
     DOWN,
     FEWEST,
+    FOUND,
     SCALE,
     TOUCHING,
     Toss,
-    errors,
+    centers_apart,
     halves,
     of_both,
     other,
+    poses,
     scene_of,
 )
 from blocks import CORNERS, RATE, Flight
@@ -38,28 +39,31 @@ from sheetbend.arrays.rotations import matrices_of, quaternions_of
 PULL = 9.0  # m/s^2, by which gravity may miss the acceleration of a flight
 LEAST = 7  # frames of a flight
 LONG, FAST = 12, 4.0  # frames, rad/s of the hinge: flights that are either count
-AFTER = 6  # frames from the end of free flight on that the fit sees
+AFTER = 10  # frames from the end of free flight on that the fit sees
 FINE = sb.Solver(h=1 / (16 * RATE), method="implicit")  # of that fit
 COMPARED = CORNERS / SCALE
 SIGMA = 1e-3  # m, of a corner: what the model may be off by
 FROM = {  # where the fit starts; the second block has the numbers of the first
-    "first_table_friction": 0.2,
-    "first_table_contact_dissipation": 0.6,
+    "first_table_friction": 0.25,
+    "first_table_contact_dissipation": 0.4,
     "first_table_contact_stiffness": 2e5,
     "rounding": 1e-3,
     "hinge_viscosity": 1e-4,
-    **{f"first_inertia_{k}": 1.2 * moment for k, moment in BOX.items()},
+    "hinge_tilt_stiffness": 90.0,
+    "hinge_tilt_damping": 0.05,
+    **{f"first_inertia_{k}": 1.3 * moment for k, moment in BOX.items()},
     "table_z": 0.0,
     "stretch": 0.0,
 }
 SIZES = {"rounding": 2e-3, "table_z": 1e-3, "stretch": 0.01}
-SEARCH = {  # start, and the first step in its logarithm; heavier: moments of inertia over those of homogeneous blocks
-    "first_table_friction": (0.17, -0.25),
-    "first_table_contact_dissipation": (2.0, 0.5),
-    "rounding": (2e-3, 0.5),
-    "hinge_viscosity": (2e-4, 1.0),
-    "heavier": (1.1, 0.2),
+SEARCH = {  # start, and the first step in its logarithm
+    "first_table_friction": (0.3, -0.25),
+    "first_table_contact_dissipation": (0.5, 0.5),
+    "hinge_tilt_stiffness": (90.0, 0.4),
+    "hinge_tilt_damping": (0.12, -0.7),
 }
+RUNS = 26
+SEEN = {10: 10.0, 20: 25.0, 40: 45.0}  # frames after free flight, and how far off a rigid hinge is there, mm
 
 
 def between(toss: Toss) -> list[Flight]:
@@ -128,22 +132,30 @@ def fitted(group: list[Toss]) -> sb.Fit:
     return sb.fit(experiments, parameters=[*free, *tied], windows=[], refine=False, profiles=False, tolerance=1e-4)
 
 
+def after(toss: Toss, values: dict[str, float]) -> np.ndarray:
+    """mm, mean of both centers, at the frames of SEEN, on a table as high as the blocks rest on."""
+    end = min(toss.free + max(SEEN), len(toss.times))
+    kept = {name: getattr(toss, name)[:end] for name in ("times", "positions", "quaternions", "angles")}
+    part = replace(toss, **kept)
+    apart = centers_apart(part, poses(part, {**of_both(values), "table_z": seen_height(toss)})).mean(axis=0)
+    return np.array([apart[min(toss.free - 1 + k, end - 1)] for k in SEEN])
+
+
 def searched(group: list[Toss], runs: int) -> dict[str, float]:
-    """The numbers with which whole paths are predicted best by Nelder and Mead's simplex: the score is the mean error
-    of the centers over time plus a third of that at rest."""
+    """The numbers with which paths after the first impacts are predicted best by Nelder and Mead's simplex: the score
+    is the mean error of the centers at the frames of SEEN, each over its size there."""
     start, step = np.array(list(SEARCH.values())).T
     best: tuple[float, dict[str, float]] = (np.inf, {})
 
     def score(logs: np.ndarray) -> float:
         nonlocal best
         values = dict(zip(SEARCH, (start * np.exp(logs)).tolist(), strict=True))
-        heavier = values.pop("heavier")
-        values |= {f"first_inertia_{k}": heavier * moment for k, moment in BOX.items()}
-        found = np.mean([errors(toss, of_both(values)) for toss in group], axis=0)
-        own = float(found[0] + found[1] / 3.0)
+        found = np.mean([after(toss, FOUND | values) for toss in group], axis=0)
+        own = float(np.mean(found / list(SEEN.values())))
         if own < best[0]:
             best = own, values
-            print(f"{own:.1f} mm: " + ", ".join(f"{name} {value:.3g}" for name, value in values.items()), flush=True)
+            told = ", ".join(f"{name} {value:.3g}" for name, value in values.items())
+            print(f"{own:.3f} ({', '.join(f'{a:.1f}' for a in found)} mm): {told}", flush=True)
         return own
 
     simplex = np.concatenate([np.zeros((1, len(step))), np.diag(step)])
@@ -164,7 +176,7 @@ def main(what: str) -> None:
     elif what == "fit":
         print(fitted(group).report())
     else:
-        searched(group, 22)
+        searched(group, RUNS)
 
 
 if __name__ == "__main__":
