@@ -21,10 +21,11 @@ constexpr std::size_t most_kept = std::size_t{1} << 23;
 // All experiments are simulated once per point, here, before Ceres asks for residuals.
 class Point : public ceres::EvaluationCallback {
  public:
-  Point(const EvaluationFunction& evaluation, const std::vector<double>& u, const std::vector<double>& longest)
+  Point(const EvaluationFunction& evaluation, const std::vector<double>& u, const CeresOptions& options)
       : evaluation_(evaluation),
         u_(u),
-        longest_(longest),
+        longest_(options.longest_step),
+        seconds_{options.residual_seconds, std::numeric_limits<double>::infinity()},
         residual(evaluation.rows),
         jacobian(static_cast<std::size_t>(evaluation.rows) * u.size()) {}
 
@@ -72,7 +73,7 @@ class Point : public ceres::EvaluationCallback {
   const std::vector<double>& longest_;
   std::vector<double> at_, last_;
   bool has_jacobian_ = false;
-  double seconds_[2]{0.0, std::numeric_limits<double>::infinity()};  // of the last evaluation without, with a Jacobian
+  double seconds_[2];  // of the last evaluation without, with a Jacobian
 
  public:
   std::vector<double> residual, jacobian;
@@ -131,7 +132,7 @@ class Callback : public ceres::IterationCallback {
 CeresResult minimize_with_ceres(const EvaluationFunction& evaluation, std::vector<double> u,
                                 const std::vector<double>& lower, const std::vector<double>& upper,
                                 const CeresOptions& options, const Observe& observe) {
-  Point point(evaluation, u, options.longest_step);
+  Point point(evaluation, u, options);
   Callback callback(observe, point, u);
   ceres::Problem::Options problem_options;
   problem_options.evaluation_callback = &point;

@@ -202,6 +202,18 @@ std::vector<double> Problem::respond(int experiment, const double* u, const doub
   return moved;
 }
 
+std::vector<double> Problem::reduced(const double* change) const {
+  std::vector<double> made(rows(), 0.0);
+  std::copy_n(change, data_rows(), made.begin());
+  int row = data_rows() + priors_;
+  for (std::size_t e = 0; e < projections_.size(); ++e) {
+    if (!projections_[e]) continue;
+    projections_[e]->reduce(made.data() + first_row_[e], made.data() + row);
+    row += projections_[e]->unknowns();
+  }
+  return made;
+}
+
 const std::vector<double>& Problem::correction(int experiment) const {
   const auto& own = projections_.at(experiment);
   return own ? own->b() : experiments_[experiment].correction.given;
@@ -215,6 +227,11 @@ double Problem::absorbed(int experiment) const {
 void Problem::relinearize() const {
   for (const auto& own : projections_)
     if (own) own->relinearize();
+}
+
+void Problem::follow(const Problem& other) const {
+  for (std::size_t e = 0; e < std::min(projections_.size(), other.projections_.size()); ++e)
+    if (projections_[e] && other.projections_[e]) projections_[e]->follow(*other.projections_[e]);
 }
 
 std::vector<double> Problem::state() const {

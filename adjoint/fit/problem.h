@@ -45,6 +45,10 @@ class Problem {
   std::vector<double> respond(int experiment, const double* u, const double* changes, int count,
                               Interrupt* interrupt) const;
 
+  // What corrections leave of a change of the data's residuals that fixed corrections make, to first order and by their last linearization: (rows),
+  // with what it changes in their own rows.
+  std::vector<double> reduced(const double* change) const;
+
   // The correction [m] of an experiment in the last evaluation, or as given where none is estimated.
   const std::vector<double>& correction(int experiment) const;
 
@@ -53,6 +57,9 @@ class Problem {
 
   // Lets the next evaluation linearize the corrections where it ends, for intervals.
   void relinearize() const;
+
+  // Lets corrections go on from where those of another problem with the same recordings ended (projection.h).
+  void follow(const Problem& other) const;
 
   // What an evaluation depends on besides u, where corrections are estimated: they go on from where the last one ended. Empty otherwise. A
   // problem with a restored state, which must be one of its own, gives the same bits.

@@ -31,6 +31,7 @@ void Projection::linearize(const Corrected& here, Place place, double damping, I
   factor(damping);
   place_ = std::move(place);
   known_ = true;
+  followed_ = false;
 }
 
 void Projection::factor(double damping) {
@@ -44,12 +45,31 @@ void Projection::renew(Interrupt* interrupt) {
   linearize(*here, Place(place_), damping_, interrupt);
 }
 
+void Projection::follow(Projection& other) {
+  other.renew(nullptr);
+  if (!other.known_ || other.unknowns() != unknowns() || other.A_.rows != static_cast<int>(e_->residual_count()))
+    return;
+  b_ = other.b_;
+  given_ = other.given_;
+  A_ = other.A_;
+  place_ = other.place_;
+  factor_ = other.factor_;
+  damping_ = other.damping_;
+  known_ = followed_ = true;
+  stale_ = false;
+  const bool alike = other.parameters_ == parameters_;
+  X_ = alike ? other.X_ : Eigen::MatrixXd();
+  u_ = alike ? other.u_ : Eigen::VectorXd();
+  b_there_ = alike ? other.b_there_ : Eigen::VectorXd();
+  solved_ = alike ? other.solved_ : Eigen::VectorXd();
+}
+
 void Projection::save(std::vector<double>& numbers) const {
   const auto append = [&](const double* first, std::size_t size) {
     numbers.push_back(static_cast<double>(size));
     numbers.insert(numbers.end(), first, first + size);
   };
-  numbers.insert(numbers.end(), {double(exact_), double(known_), damping_, place_.tolerance});
+  numbers.insert(numbers.end(), {double(exact_), double(known_), double(followed_), damping_, place_.tolerance});
   append(place_.theta.data(), place_.theta.size());
   append(place_.b.data(), place_.b.size());
   for (const Eigen::VectorXd* v : {&b_, &u_, &b_there_, &solved_}) append(v->data(), v->size());
@@ -70,6 +90,7 @@ void Projection::restore(const double*& numbers) {
   };
   exact_ = next() != 0.0;
   known_ = next() != 0.0;
+  const bool followed = next() != 0.0;
   damping_ = next();
   place_.tolerance = next();
   place_.theta = list();
@@ -78,7 +99,7 @@ void Projection::restore(const double*& numbers) {
   const Eigen::VectorXd X = taken();
   X_ = Eigen::MatrixXd::Map(X.data(), X.size() == 0 ? 0 : unknowns(), parameters_);
   given_ = in_meters(b_);
-  stale_ = known_;
+  stale_ = known_ && !(followed && followed_);
 }
 
 Eigen::VectorXd Projection::predicted(const double* u) const {
@@ -187,6 +208,14 @@ void Projection::solve(const std::vector<double>& theta, const double* u, double
   if (exact_)
     linearize(*Corrected::at(*e_, theta.data(), given_.data(), interrupt), {theta, given_, exact}, 0.0, interrupt);
   exact_ = false;
+}
+
+void Projection::reduce(double* change, double* prior_change) {
+  renew(nullptr);
+  Eigen::Map<Eigen::VectorXd> r(change, A_.rows);
+  const Eigen::VectorXd x = -factor_.solve(A_.transposed(r));
+  r += A_.times(x);
+  Eigen::VectorXd::Map(prior_change, unknowns()) = x;
 }
 
 void Projection::project(const double* u, const double* residual, double* jacobian, double* prior_jacobian) {

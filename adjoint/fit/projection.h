@@ -36,6 +36,9 @@ class Projection {
   // Turns J_theta (rows x parameters, row-major) into J_theta + A X and fills X (unknowns x parameters), where `solve` ended.
   void project(const double* u, const double* residual, double* jacobian, double* prior_jacobian);
 
+  // What b leaves, to first order, of a change of the residuals at fixed b, and by how much b changes: [change + A x; x], x = -(A^T A + 1)^-1 A^T change.
+  void reduce(double* change, double* prior_change);
+
   // Lets the next `solve` make A where it ends.
   void relinearize() { exact_ = true; }
 
@@ -45,8 +48,13 @@ class Projection {
     return unknowns() - factor_.inverse_trace();
   }
 
+  // Goes on from where a projection of the same recording ended, such as one of the same motion with another solver: from its b, and its A guides the
+  // steps until they are many. Where its numbers or residuals are others, nothing follows.
+  void follow(Projection& other);
+
   // Everything besides u that later results depend on, appended to numbers; and a projection that goes on from there to the same bits, which
-  // takes what it reads off their front. A is too large to keep: only where it was made is, and it is made again when it is needed.
+  // takes what it reads off their front. A is too large to keep: only where it was made is, and it is made again when it is needed. One that was
+  // followed is kept where there is one, so that a projection that followed the same one goes on to the same bits.
   void save(std::vector<double>& numbers) const;
   void restore(const double*& numbers);
 
@@ -68,6 +76,7 @@ class Projection {
   Eigen::VectorXd b_;
   bool exact_ = false, known_ = false;  // whether there is an A
   bool stale_ = false;                  // whether it is still to be made again
+  bool followed_ = false;               // whether it is that of another projection
   Response A_;
   Place place_;            // of A
   ResponseFactor factor_;  // of A^T A + 1 + damping_

@@ -14,7 +14,7 @@ namespace {
 // observe(iteration, cost, step_norm, gradient_max, u) -> bool: go on?
 py::dict minimize(const py::capsule& evaluation, std::vector<double> u, const std::vector<double>& lower,
                   const std::vector<double>& upper, std::vector<double> longest_step, std::vector<int> held,
-                  int max_iterations, double tolerance, const py::function& observe) {
+                  double residual_seconds, int max_iterations, double tolerance, const py::function& observe) {
   const auto* function =
       static_cast<const EvaluationFunction*>(PyCapsule_GetPointer(evaluation.ptr(), EvaluationFunction::capsule_name));
   if (function == nullptr) throw py::error_already_set();
@@ -24,6 +24,7 @@ py::dict minimize(const py::capsule& evaluation, std::vector<double> u, const st
   CeresOptions options;
   options.longest_step = std::move(longest_step);
   options.held = std::move(held);
+  options.residual_seconds = residual_seconds;
   options.max_iterations = max_iterations;
   options.function_tolerance = options.gradient_tolerance = options.parameter_tolerance = tolerance;
   std::exception_ptr raised;
@@ -64,5 +65,6 @@ py::dict minimize(const py::capsule& evaluation, std::vector<double> u, const st
 PYBIND11_MODULE(_ceres, m) {
   m.doc() = "Levenberg-Marquardt by Ceres on a sheetbend problem.";
   m.def("minimize", &minimize, py::kw_only(), py::arg("evaluation"), py::arg("u"), py::arg("lower"), py::arg("upper"),
-        py::arg("longest_step"), py::arg("held"), py::arg("max_iterations"), py::arg("tolerance"), py::arg("observe"));
+        py::arg("longest_step"), py::arg("held"), py::arg("residual_seconds") = 0.0, py::arg("max_iterations"),
+        py::arg("tolerance"), py::arg("observe"));
 }

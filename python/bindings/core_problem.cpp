@@ -261,6 +261,12 @@ void bind_problem(py::module_& m) {
              }
              return to_numpy(moved, {count, static_cast<py::ssize_t>(moved.size()) / std::max(count, 1)});
            })
+      .def("reduced",
+           [](const Problem& p, const Array& change) {
+             expect_size(change, p.data_rows(), "change");
+             const std::vector<double> made = p.reduced(change.data());
+             return to_numpy(made, {static_cast<py::ssize_t>(made.size())});
+           })
       .def("correction",
            [](const Problem& p, int experiment) {
              const std::vector<double>& b = p.correction(experiment);
@@ -268,6 +274,7 @@ void bind_problem(py::module_& m) {
            })
       .def("absorbed", &Problem::absorbed)
       .def("relinearize", &Problem::relinearize)
+      .def("follow", &Problem::follow, py::arg("other"))
       .def("state",
            [](const Problem& p) {
              const std::vector<double> state = p.state();

@@ -13,6 +13,7 @@ def minimize(
     upper: ArrayLike,
     longest_step: ArrayLike,
     held: Sequence[int],
+    residual_seconds: float = 0.0,
     max_iterations: int,
     tolerance: float,
     observe: Callable[..., bool],

@@ -23,6 +23,7 @@ from sheetbend.minimum import content, journal
 from sheetbend.minimum.journal import Journal
 from sheetbend.minimum.optimizers import Progress, has_ceres, minimize
 from sheetbend.minimum.problem import FitProblem
+from sheetbend.minimum.time_step import halved
 
 WANTED = ("rope_EI", "rope_bend_damping")
 OPTIMIZERS = ["scipy", *(["ceres"] if has_ceres() else [])]
@@ -304,6 +305,23 @@ class TestCorrections:
             assert problem.core.state().tobytes() == other.core.state().tobytes()
         _, r, _ = untouched.core.evaluate(u + 0.3, True)
         assert r.tobytes() != s.tobytes()  # else this shows nothing
+
+    def test_a_problem_that_follows_another_goes_on_to_the_same_bits(self, path: Path) -> None:
+        """Its corrections are guided by the response of the other one, which no state holds."""
+
+        def ends(points: tuple[float, ...]) -> list[bytes]:
+            problem = problem_of(shaken())
+            u = problem.parameters.initial()
+            problem.evaluate(u)
+            other = problem.of(halved(problem.experiments)).follow(problem)
+            return [other.evaluate(u + step, jacobian=False)[1].tobytes() for step in points]
+
+        whole = ends((0.0, 0.05, 0.1))
+        with Journal(path):
+            ends((0.0,))
+        with Journal(path) as journal:
+            assert ends((0.0, 0.05, 0.1)) == whole
+            assert journal.read == 2 and journal.made == 2
 
     @pytest.mark.parametrize("optimizer", OPTIMIZERS)
     def test_a_fit_goes_on_to_the_same_bits(self, optimizer: str, path: Path) -> None:

@@ -203,6 +203,35 @@ def test_kicks_that_the_model_does_not_know_are_what_it_loses() -> None:
     assert hard.result.recordings[0].rms > 3 * soft.result.recordings[0].rms  # type: ignore[operator]
 
 
+def test_states_beside_the_parameters_have_the_derivatives_that_follow_from_them() -> None:
+    """The reduced Jacobian is what the states leave of that with states held."""
+    problem = cut(swing(), 1e-3)
+    u = problem.parameters.initial()
+    _, _, reduced = problem.evaluate(u)
+    free = problem.with_states(u)
+    assert free is not None and list(free.states) == [0]
+    A, windows = free.states[0], 5
+    assert A.shape == (problem.core.rows, 2 * (windows - 1))
+    X, *_ = np.linalg.lstsq(A, free.jacobian, rcond=None)
+    assert free.jacobian - A @ X == pytest.approx(reduced, abs=1e-7 * np.abs(reduced).max())
+    gaps = problem.core.rows - problem.core.data_rows
+    assert len(free.border) == len(free.motion) == gaps
+    assert np.unique(free.border) == pytest.approx([0.4, 0.8, 1.2, 1.6])
+    started = np.flatnonzero(free.jacobian[:, 2:].any(axis=1))  # the start is seen in the first window and its gap
+    assert problem.row_times()[started[started < problem.core.data_rows]].max() <= 0.4 + 0.03
+    assert (free.border[started[started >= problem.core.data_rows] - problem.core.data_rows] == 0.4).all()
+
+
+def test_parts_of_a_shot_motion_ask_nothing_of_a_start_that_they_do_not_show() -> None:
+    """By way of states that followed as in the fit to all of the data, the third quarter asked for an angle of
+    -60,000 rad."""
+    e = swing(stop=4.0, kicks=0.05, seed=3, shooting=0.8)
+    found = sb.fit(e, parameters=list(WANTED), refine=False, profiles=False, beginnings=False)
+    doubted = {name: found[name].words for name in WANTED if "contradict" in found[name].words}
+    assert list(doubted) == ["arm_hinge_viscosity"]
+    assert "the third quarter of the time asks for" in doubted["arm_hinge_viscosity"]
+
+
 def test_a_motion_that_loses_nothing_says_so_in_every_result(tmp_path: Path) -> None:
     e = swing(fit=(0.0, 1.6), held_out=(1.6, 2.0), shooting=0.4)
     found = sb.fit(e, parameters=list(WANTED))

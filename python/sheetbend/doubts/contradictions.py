@@ -11,6 +11,7 @@ import numpy as np
 from ..arrays.timeseries import Array, mean_position
 from ..experiment.experiment import Experiment
 from ..minimum.discretization import Refinement
+from ..minimum.lifted import WithStates
 from ..minimum.problem import FitProblem
 from ..minimum.time_step import SECOND_ORDER, halved
 from ..quantities.parameters import Parameter
@@ -108,8 +109,13 @@ def _between(
     layout, within = problem.rows_layout(), _private(problem, J[:rows, used])
     known = np.column_stack(shifts) if shifts else None
     taken = sum(map(problem.core.absorbed, range(len(problem.experiments))))
-    every = splits(problem, J[:rows, used])
-    found = contradiction(r, J[:, used], every, layout=layout, within=within, shifts=known, taken=taken, errors=errors)
+    free = problem.with_states(u)
+    every = splits(problem, J[:rows, used], free)
+    J = J[:, used]
+    if free is not None:
+        J, within = _beside_states(problem, free, used, within)
+        taken -= J.shape[1] - len(used)  # each state counts as one number, as what is solved for within a recording
+    found = contradiction(r, J, every, layout=layout, within=within, shifts=known, taken=taken, errors=errors)
     if found is None:
         return {}
     words = {}
@@ -118,7 +124,7 @@ def _between(
         reach = reach_of(problem.parameters[name], estimates[name]) + SECOND_ORDER * d.shift
         if abs(d.steps[0] - d.steps[1]) > d.reach + SECOND_ORDER * d.shift and abs(d.steps[0]) > reach:
             words[name] = _difference_words(problem.parameters[name], u[column], d)
-    for without in left_out(r, J[:, used], found.split, layout, within, known, taken, errors):
+    for without in left_out(r, J, found.split, layout, within, known, taken, errors):
         name, column = names[used[without.column]], used[without.column]
         p = problem.parameters[name]
         reach = max(reach_of(p, estimates[name]), without.reach)
@@ -157,7 +163,8 @@ def residual_shifts(problem: FitProblem, u: Array, refinement: Refinement) -> li
     _, r, _ = problem.evaluate(u)
     shifts, rows = [], problem.core.data_rows
     for experiments in finer_experiments(problem, refinement):
-        ok, there, _ = FitProblem(experiments, problem.given, threads=problem.threads).evaluate(u, jacobian=False)
+        finer = FitProblem(experiments, problem.given, threads=problem.threads).follow(problem)
+        ok, there, _ = finer.evaluate(u, jacobian=False)
         if ok:
             shifts.append(there[:rows] - r[:rows])
     return shifts
@@ -208,19 +215,39 @@ def _private(problem: FitProblem, jacobian: Array) -> list[tuple[slice, list[int
     ]
 
 
-def splits(problem: FitProblem, jacobian: Array) -> list[Split]:
+def _beside_states(
+    problem: FitProblem, free: WithStates, used: Sequence[int], within: Sequence[tuple[slice, list[int]]]
+) -> tuple[Array, list[tuple[slice, list[int]]]]:
+    """The columns of parameters and of the states of windows, and which of them are solved for within a recording:
+    states too, so that they follow the values that each part asks for."""
+    columns, first = [free.jacobian[:, used]], problem.core.first_rows
+    own = {part.start: (part, list(mine)) for part, mine in within}
+    for i, states in free.states.items():
+        part, mine = own.get(first[i], (slice(first[i], first[i + 1]), []))
+        begun = sum(c.shape[1] for c in columns)
+        own[first[i]] = part, [*mine, *range(begun, begun + states.shape[1])]
+        columns.append(states)
+    return np.hstack(columns), list(own.values())
+
+
+def splits(problem: FitProblem, jacobian: Array, free: WithStates | None = None) -> list[Split]:
     """The data by time (halves, thirds, quarters), by place of the markers (halves of the same weight in the Jacobian)
-    and by recording."""
+    and by recording. Of motions that are shot in windows, the gaps go with the window before."""
     layout, count, when = problem.rows_layout(), len(problem.experiments), problem.row_times()
+    of_gaps = np.zeros(0) if free is None else free.border.copy()
+    others = problem.core.rows - len(layout.frame)
     size = np.maximum(np.linalg.norm(jacobian, axis=0), np.finfo(float).tiny)
     weight = ((jacobian / size) ** 2).sum(axis=1)
     time, place = np.full(len(weight), -1.0), np.full(len(weight), -1)
     for i, (e, recording) in enumerate(zip(problem.experiments, problem.recordings, strict=True)):
         mine = layout.recording == i
         if not e.static:
-            at = when[mine]
-            at = at - at.min()
-            time[mine] = at / (np.ptp(at) * (1 + 1e-9) + np.finfo(float).tiny)
+            at, first = when[mine], float(when[mine].min())
+            span = np.ptp(at) * (1 + 1e-9) + np.finfo(float).tiny
+            time[mine] = (at - first) / span
+            if free is not None:
+                own = free.motion == i
+                of_gaps[own] = (free.border[own] - first) / span * (1 - 1e-9)
         mine &= layout.clocks == 0  # where sensors are is no place among the markers
         marker = layout.frame[mine] if e.static else layout.channel[mine] // len(e.axes)
         along = _along(recording.positions)
@@ -230,14 +257,15 @@ def splits(problem: FitProblem, jacobian: Array) -> list[Split]:
     for parts, name in ((2, "half"), (3, "third"), (4, "quarter")):
         part = np.where(time < 0, -1, (parts * time).astype(int))
         order = (*ORDINALS[: parts - 1], "last")
-        made.append(Split(part, tuple(f"the {which} {name} of the time" for which in order)))
+        behind = np.append(np.full(others - len(of_gaps), -1), (parts * of_gaps).astype(int))
+        made.append(Split(part, tuple(f"the {which} {name} of the time" for which in order), others=behind))
     made.append(Split(place, ("one side's markers", "the other side's markers")))
     if count > 1:
-        made.append(_by_recording(problem, jacobian))
+        made.append(_by_recording(problem, jacobian, free))
     return made
 
 
-def _by_recording(problem: FitProblem, jacobian: Array) -> Split:
+def _by_recording(problem: FitProblem, jacobian: Array, free: WithStates | None) -> Split:
     """Each recording, or groups of neighbors where there are too many or too short ones."""
     layout, names = problem.rows_layout(), [e.name for e in problem.experiments]
     own = {column for _, columns in _private(problem, jacobian) for column in columns}
@@ -250,7 +278,10 @@ def _by_recording(problem: FitProblem, jacobian: Array) -> Split:
             break
     members = [np.flatnonzero(group == k) for k in range(parts)]
     called = [names[m[0]] if len(m) == 1 else f"the group of {names[m[0]]} to {names[m[-1]]}" for m in members]
-    return Split(part, tuple(called), apart=True)
+    others = np.full(problem.core.rows - len(part), -1)
+    if free is not None:
+        others[len(others) - len(free.motion) :] = group[free.motion]
+    return Split(part, tuple(called), apart=True, others=others)
 
 
 def _half(order: Array, weight: Array) -> Array:

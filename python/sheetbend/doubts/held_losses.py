@@ -101,7 +101,7 @@ def _columns(problem: FitProblem, u: Array, names: Sequence[str]) -> dict[str, A
         problem.recordings,
         problem.threads,
         Parameters([*held, *freed]),
-    )
+    ).follow(problem)
     _, _, J = with_losses.evaluate(with_losses.parameters.initial())
     columns = dict(zip(with_losses.parameters.free, J.T, strict=True))
     rows = problem.core.rows

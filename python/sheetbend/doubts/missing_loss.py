@@ -8,9 +8,11 @@ hardly damps it. The difference of one simulation with each is a direction in wh
 more. Where this direction, beside the parameters, explains a large part of what a fit leaves beyond noise, and more
 than chance does, the model lacks a loss; where it does so backward, the model loses too much.
 
-Where driven markers are corrected, both simulations solve for their corrections. The difference, of the corrections'
-prior rows too, is then what a loss leaves that corrections do not take up, as a column of the reduced Jacobian is.
-States of motions in windows follow by one Gauss-Newton step, which is their first order.
+Where driven markers are corrected, both simulations have the corrections of the fit. What other corrections would take
+of the difference is taken off to first order, as from a column of the reduced Jacobian. To solve for the corrections of
+the second simulation would ask another question: on a flag they lead to another minimum, which depends on where they
+start, at a hundred times the cost. States of motions in windows follow by one Gauss-Newton step, which is their first
+order.
 """
 
 from __future__ import annotations
@@ -106,14 +108,19 @@ def of_more_loss(problem: FitProblem, u: Array) -> Array | None:
         e if e.static else replace(e, solver=replace(e.solver, integrator=OTHER[e.solver.integrator]))
         for e in problem.experiments
     ]
-    ok_there, there, _ = problem.of([in_steps(e, 1) for e in made]).evaluate(u, jacobian=False)
+    other, rows = problem.of([in_steps(e, 1) for e in made]), problem.core.data_rows
+    corrected = problem.corrections(u)
+    if corrected:
+        other = other.moved({name: x.ravel() for name, x in corrected.items()})
+    ok_there, there, _ = other.evaluate(u, jacobian=False)
     if not (ok and ok_there):
         return None
+    left = problem.core.reduced(there[:rows] - r[:rows]) if corrected else there - r
     change = np.zeros(len(r))
     for i, e in enumerate(problem.experiments):
         per = (1.0 if e.solver.integrator == "bdf2" else -1.0) / e.solver.h
         mine = rows_of(problem, [i])
-        change[mine] = per * (there - r)[mine]
+        change[mine] = per * left[mine]
     return change
 
 

@@ -10,6 +10,7 @@ it can ask of `Lifted`, so no search, verdict or journal knows of windows. How t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
@@ -20,11 +21,29 @@ from ..experiment.cut import shot
 from ..experiment.experiment import Experiment
 from ..quantities.parameters import Parameters
 from ..recording.recording import Recording
+from ..statistics.layout import Integers
 from .lifted_motion import Motion
 
 Known = tuple[Sequence[float], Sequence[Sequence[int]], Sequence[Mapping[str, Any]]]
 """theta, the places of every experiment's quantities in it, and the free parameters, as the compiled problem has
 them."""
+
+
+@dataclass(frozen=True)
+class WithStates:
+    """Derivatives at a point in which states are numbers of their own, and do not follow the parameters.
+
+    Attributes:
+        jacobian: (rows, parameters) with the states held.
+        states: by place of the experiment, (rows, numbers) with respect to its states.
+        border: (gap rows,) s, where the gap is that a row belongs to.
+        motion: (gap rows,) place of its experiment.
+    """
+
+    jacobian: Array
+    states: dict[int, Array]
+    border: Array
+    motion: Integers
 
 
 class Lifted:
@@ -88,6 +107,27 @@ class Lifted:
                 return [], []
         return [*r, self._parameters.prior_residuals(u), *gaps], [*J, self._parameters.prior_jacobian(), *of_gaps]
 
+    def with_states(self, u: Array) -> WithStates | None:
+        """None where there is no answer."""
+        J = self._residuals(u, True)[1]
+        if not J:
+            return None
+        jacobian, first = np.concatenate(J), self.rows - sum(motion.gap_rows for motion in self.motions.values())
+        border: list[Array] = [np.zeros(0)]
+        of_motion: list[Integers] = [np.zeros(0, dtype=int)]
+        states: dict[int, Array] = {}
+        for i, motion in self.motions.items():
+            data, gaps = motion.with_states()
+            rows = np.r_[self.first_rows[i] : self.first_rows[i + 1], first : first + motion.gap_rows]
+            every = np.vstack([data, gaps])
+            jacobian[rows] = every[:, : len(u)]
+            states[i] = np.zeros((self.rows, every.shape[1] - len(u)))
+            states[i][rows] = every[:, len(u) :]
+            border.append(motion.gap_times)
+            of_motion.append(np.full(motion.gap_rows, i))
+            first += motion.gap_rows
+        return WithStates(jacobian, states, np.concatenate(border), np.concatenate(of_motion))
+
     def absorbed(self, experiment: int) -> float:
         """What states at borders took of the data's degrees of freedom in the last evaluation."""
         return self.motions[experiment].absorbed() if experiment in self.motions else 0.0
@@ -111,6 +151,11 @@ class Lifted:
 
     def relinearize(self) -> None:
         """States are solved for to the end at every point."""
+
+    def follow(self, other: Lifted) -> None:
+        """Go on from the states of another problem of the same motions."""
+        if (other.rows, other.parameters) == (self.rows, self.parameters):
+            self.restore(other.state())
 
     def state(self) -> Array:
         """What evaluations depend on besides u: they go on from the states of the last one."""

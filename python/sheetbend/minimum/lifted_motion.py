@@ -234,6 +234,31 @@ class Motion:
         between = [g.border + g.before @ a + g.behind @ b for g, a, b in zip(gaps, along[:-1], along[1:], strict=True)]
         return np.concatenate(data), np.concatenate([np.zeros((0, len(here.u))), *between])
 
+    @property
+    def gap_times(self) -> Array:
+        """(gap rows,) s, at which border each is."""
+        between = self.edges[1:-1]
+        return np.repeat(between, self.gap_rows // max(len(between), 1))
+
+    def with_states(self) -> tuple[Array, Array]:
+        """Of data and gaps with respect to the parameters and all states, where the states were solved for last, by
+        derivatives of that point."""
+        here = self._here
+        assert here is not None and here.own
+        gaps, ends = self.gaps(here.seen), np.cumsum([0, *(one.data.state.shape[1] for one in here.seen)])
+        places = [slice(a, b) for a, b in pairwise(ends)]
+        parts = ([one.data.border for one in here.seen], [g.border for g in gaps])
+        data, between = (np.concatenate([np.zeros((0, len(here.u))), *part]) for part in parts)
+        of_data, of_gaps = (np.zeros((len(part), ends[-1])) for part in (data, between))
+        row = 0
+        for one, own in zip(here.seen, places, strict=True):
+            of_data[row : (row := row + len(one.data.value)), own] = one.data.state
+        row = 0
+        for g, own, onward in zip(gaps, places[:-1], places[1:], strict=True):
+            mine = slice(row, row := row + len(g.rest))
+            of_gaps[mine, own], of_gaps[mine, onward] = g.before, g.behind
+        return np.hstack([data, of_data]), np.hstack([between, of_gaps])
+
     def absorbed(self) -> float:
         """What the states took of the data's degrees of freedom, by the last derivatives."""
         here = self._known_tangent()

@@ -27,9 +27,7 @@ def residuals_there(problem: FitProblem, finer: FitProblem, u: np.ndarray) -> np
     Raises:
         SheetbendError: it has no answer at u, or other rows.
     """
-    if problem.estimates_corrections and finer.core.rows == problem.core.rows:
-        finer.core.restore(problem.core.state())  # its corrections begin where those of the problem ended
-    ok, there, _ = finer.evaluate(u, jacobian=False)
+    ok, there, _ = finer.follow(problem).evaluate(u, jacobian=False)
     if not ok:
         raise SheetbendError(f"the refinement cannot start: {finer.failure}")
     if len(there) != problem.core.rows:

@@ -294,6 +294,7 @@ def _ceres_holding(
             upper=upper,
             longest_step=coordinates.longest,
             held=sorted(held),
+            residual_seconds=problem.seconds.get(False, 0.0),
             max_iterations=max_iterations,
             tolerance=tolerance,
             observe=observe,

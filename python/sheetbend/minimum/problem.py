@@ -20,7 +20,7 @@ from . import content
 from .coordinates import Coordinates, sums_of
 from .counts import count
 from .journal import Evaluator, Timed
-from .lifted import Known, lifted
+from .lifted import Known, Lifted, WithStates, lifted
 from .parts import expanded_to, reaching
 from .spread import Spread
 
@@ -114,6 +114,13 @@ class FitProblem:
     def of(self, experiments: Sequence[Experiment]) -> FitProblem:
         """The same problem of other experiments with the same recordings, such as these with another solver."""
         return FitProblem(experiments, self.given, self.recordings, self.threads, self.parameters)
+
+    def follow(self, other: FitProblem) -> FitProblem:
+        """This problem, with corrections that begin where those of another one of the same recordings ended: most of
+        the search for them is saved."""
+        if self.estimates_corrections and other.estimates_corrections:
+            self.core.follow(other.core)
+        return self
 
     def uncorrected(self, recordings: Sequence[Recording]) -> FitProblem:
         """The same problem on (parts of) the recordings, with the markers that scenes follow taken for the truth."""
@@ -211,6 +218,10 @@ class FitProblem:
         if jacobian:
             self._last = np.array(u, dtype=float), found
         return found
+
+    def with_states(self, u: np.ndarray) -> WithStates | None:
+        """Where motions are shot in windows, derivatives at u with their states as numbers of their own."""
+        return self.core.with_states(u) if isinstance(self.core, Lifted) else None
 
     def keep(self, u: np.ndarray, r: np.ndarray, J: np.ndarray) -> None:
         """Take what was evaluated at u past the problem for the last Jacobian; not where corrections go on from it."""

@@ -48,11 +48,17 @@ class Split:
         part: (rows,) number of the part that a row belongs to, -1 for none.
         names: of the parts, in words.
         apart: whether the parts share no errors, as separate recordings do.
+        others: (others,) likewise, of the rows that are no data; None = all belong to none.
     """
 
     part: Integers
     names: tuple[str, ...]
     apart: bool = False
+    others: Integers | None = None
+
+    def of_others(self, count: int) -> Integers:
+        """(count,) numbers of the parts of the rows that are no data."""
+        return np.full(count, -1) if self.others is None else self.others
 
 
 @dataclass(frozen=True)
@@ -155,12 +161,15 @@ def _compared(
     sizes = np.bincount(split.part[split.part >= 0], minlength=parts)
     if count == 0 or count * parts > MOST_COLUMNS or sizes.min() < FEWEST * count:
         return None
-    coding = np.vstack([np.eye(parts - 1), -np.ones(parts - 1)])[split.part]
-    coding = np.vstack([coding, np.zeros((len(residuals) - rows, parts - 1))])
+    signs = np.vstack([np.eye(parts - 1), -np.ones(parts - 1), np.zeros(parts - 1)])  # -1, the last, is of none
+    coding = signs[np.append(split.part, split.of_others(len(residuals) - rows))]
     opposed = [jacobian[:, shared] * coding[:, [k]] for k in range(parts - 1)]
     columns = np.hstack([jacobian[:, shared], *opposed, known, drawn])
     every, left = solved_within(jacobian, within, columns, residuals, rows)
     every, drawn = np.split(every, [every.shape[1] - drawn.shape[1]], axis=1)
+    seen = [[jacobian[:rows][split.part == k, column].any() for column in shared] for k in range(parts)]
+    everywhere = np.tile(np.all(seen, axis=0), parts)  # what a part does not show, it asks for no other value of
+    every[:, count : count * parts][:, ~everywhere[count:]] = 0.0
     used = independent(every)
     compared = [c for c in used if count <= c < count * parts]
     if not compared:

@@ -83,11 +83,12 @@ def left_out(
     most: dict[int, LeftOut] = {}
     steps: dict[int, list[float]] = {}
     for k, name in enumerate(split.names):
-        inside = np.append(split.part == k, np.zeros(extra, dtype=bool))
+        inside = np.append(split.part, split.of_others(extra)) == k
         columns = np.hstack([jacobian[:, shared], jacobian[:, shared] * inside[:, None], known, drawn])
         every, left = solved_within(jacobian, within, columns, residuals, rows)
         every, noise = np.split(every, [every.shape[1] - drawn.shape[1]], axis=1)
         used = independent(every)
+        elsewhere = jacobian[~inside][:, shared].any(axis=0)  # whether the rest shows it
         if rows <= len(used) + len(private):
             continue
         step = -solved(every[:, used], left, rcond=None)
@@ -101,6 +102,8 @@ def left_out(
         for i, c in enumerate(used):
             if c >= len(shared):
                 break
+            if not elsewhere[c]:
+                continue
             degrees = max(float(spread.degrees[i] / (2 - 1 / spread.inflation[i])), 1.0)
             t = float(require("scipy.special", "fit").stdtrit(degrees, 0.975))
             reach = t * math.sqrt(max(float(V[i, i]), 0.0))
