@@ -350,11 +350,9 @@ TEST_P(Constraint, RestValuesAreMeasuredOrSaid) {
 }
 
 TEST(Registry, NamesAreDistinctAndKnown) {
-  for_each_kind([]<class K>(K) {
-    int same = 0;
-    for_each_kind([&]<class L>(L) { same += std::string(K::name) == L::name; });
-    EXPECT_EQ(same, 1) << K::name;
-  });
+  std::vector<std::string> names;
+  for_each_kind([&]<class K>(K) { names.push_back(K::name); });
+  for (const std::string& name : names) EXPECT_EQ(std::ranges::count(names, name), 1) << name;
   EXPECT_THROW(with_kind(kind_count, [](auto) {}), std::logic_error);
 }
 

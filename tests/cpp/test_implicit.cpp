@@ -2,9 +2,10 @@
 // way back. Their gradients, lanes and threads are in the tests over all solvers.
 #include <Eigen/Eigenvalues>
 
-#include "core/element/second_order.h"
+#include "core/element/any_kind_hessian.h"
 #include "core/scalar/complex.h"
 #include "core/solver/newton_matrix.h"
+#include "tests/cpp/support/case.h"
 #include "tests/cpp/support/programs.h"
 
 namespace sheetbend::testing {
@@ -13,31 +14,31 @@ namespace {
 using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 TEST(SecondOrder, IsTheDerivativeOfTheGradient) {
-  for (int kind = 0; kind < kind_count; ++kind)
-    with_kind(kind, [&]<class K>(K) {
-      SCOPED_TRACE(K::name);
-      const Case sample = case_of<K>();
-      double lambda[K::rows];
-      for (int j = 0; j < K::rows; ++j) lambda[j] = 3.0 - 1.7 * j;
-      std::vector<double> H(triangle(K::dofs)), expected;
-      const SecondOrder<K, double> at(sample.x.data(), sample.p.data());
-      const Evaluation<K, double> plain(sample.x.data(), sample.p.data());
-      EXPECT_TRUE(std::equal(at.C, at.C + K::rows, plain.C));
-      EXPECT_TRUE(std::equal(at.J, at.J + K::rows * K::dofs, plain.J));
-      at.add_hessian(lambda, H.data());
-      const std::vector<Complex> p(sample.p.begin(), sample.p.end());
-      for (int b = 0; b < K::dofs; ++b) {
-        std::vector<Complex> x(sample.x.begin(), sample.x.end());
-        x[b].im = complex_step;
-        const Evaluation<K, Complex> near(x.data(), p.data());
-        for (int a = 0; a <= b; ++a) {
-          double sum = 0.0;
-          for (int j = 0; j < K::rows; ++j) sum += lambda[j] * near.J[j * K::dofs + a].im / complex_step;
-          expected.push_back(sum);
-        }
+  for (int kind = 0; kind < kind_count; ++kind) {
+    SCOPED_TRACE(kind_name(kind));
+    const Case sample = case_of(kind);
+    AnyConstraint<double> plain;
+    std::copy(sample.x.begin(), sample.x.end(), plain.x);
+    plain.evaluate(kind, sample.p.data());
+    const int rows = plain.kind->rows, dofs = plain.kind->dofs;
+    std::vector<double> lambda, J(rows * dofs), H(triangle(dofs)), expected;
+    for (int j = 0; j < rows; ++j) lambda.push_back(3.0 - 1.7 * j);
+    add_hessian(kind, sample.x.data(), sample.p.data(), lambda.data(), J.data(), H.data());
+    EXPECT_TRUE(std::equal(J.begin(), J.end(), plain.J));
+    const std::vector<Complex> p(sample.p.begin(), sample.p.end());
+    AnyConstraint<Complex> near;
+    for (int b = 0; b < dofs; ++b) {
+      std::copy(sample.x.begin(), sample.x.end(), near.x);
+      near.x[b].im = complex_step;
+      near.evaluate(kind, p.data());
+      for (int a = 0; a <= b; ++a) {
+        double sum = 0.0;
+        for (int j = 0; j < rows; ++j) sum += lambda[j] * near.J[j * dofs + a].im / complex_step;
+        expected.push_back(sum);
       }
-      EXPECT_LE(relative_error(H, expected), 1e-13);
-    });
+    }
+    EXPECT_LE(relative_error(H, expected), 1e-13);
+  }
 }
 
 TEST(MakeConvex, TakesTheNegativeEigenvaluesAway) {

@@ -83,28 +83,27 @@ struct PotentialCase {
       R[i] = away / T(p.x[row * (i / 3) + 3]);
       sum += T(0.5) * away * R[i];
     }
+    AnyConstraint<T> at;
+    T own[largest_kind.parameters];
     for (const MemberRun& run : p.block.runs) {
       const Group& group = scene().groups[run.group];
-      with_kind(group.kind, [&]<class K>(K) {
-        for (int i = 0; i < run.count; ++i) {
-          T local[K::dofs], own[parameter_count<K> + 1];
-          const auto node = [&](int k) { return run.nodes[lane_at(i, K::arity, k)]; };
-          for (int d = 0; d < K::dofs; ++d) local[d] = x[node(d / 3) + d % 3];
-          const double* rest =
-              in.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(run.items[i]) * parameter_count<K>;
-          std::copy_n(rest, parameter_count<K>, own);
-          const Rates<double> rates = rates_of(group, run.items[i]);
-          const Evaluation<K, T> value(local, own);
-          for (int j = 0; j < K::rows; ++j) {
-            T C = value.C[j];
-            if (group.damped) C += T(rates.g) * difference<K>(C, T(p.potential.C_r[run.first_row[i] + j]));
-            sum += T(0.5 * rates.scale / rates.a) * C * C;
-            for (int d = 0; d < K::dofs; ++d)
-              if (node(d / 3) < row * p.block.movable)
-                R[3 * (node(d / 3) / row) + d % 3] += value.J[j * K::dofs + d] * C / T(rates.a);
-          }
+      for (int i = 0; i < run.count; ++i) {
+        const auto node = [&](int k) { return run.nodes[lane_at(i, group.arity, k)]; };
+        for (int d = 0; d < 3 * group.arity; ++d) at.x[d] = x[node(d / 3) + d % 3];
+        const double* rest =
+            in.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(run.items[i]) * group.parameters;
+        std::copy_n(rest, group.parameters, own);
+        const Rates<double> rates = rates_of(group, run.items[i]);
+        at.evaluate(group.kind, own);
+        for (int j = 0; j < group.rows; ++j) {
+          T C = at.C[j];
+          if (group.damped) C += T(rates.g) * at.kind->difference(C, T(p.potential.C_r[run.first_row[i] + j]));
+          sum += T(0.5 * rates.scale / rates.a) * C * C;
+          for (int d = 0; d < at.kind->dofs; ++d)
+            if (node(d / 3) < row * p.block.movable)
+              R[3 * (node(d / 3) / row) + d % 3] += at.J[j * at.kind->dofs + d] * C / T(rates.a);
         }
-      });
+      }
     }
     if (phi) *phi = sum;
     return R;

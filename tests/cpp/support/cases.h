@@ -1,35 +1,15 @@
 // One row of cases per registered constraint: a sample stencil with parameters, and the symmetries that its C
 // has. Every test that goes through the Registry, and every random scene, reads this table; a kind without a
-// row does not compile.
+// row does not compile. Who knows a kind by its number alone includes case.h.
 #pragma once
 
-#include <gtest/gtest.h>
-
 #include <numeric>
-#include <string>
 #include <tuple>
-#include <vector>
 
 #include "core/constraints/registry.h"
+#include "tests/cpp/support/case.h"
 
 namespace sheetbend::testing {
-
-// How C answers when the whole stencil (and its normal) turns: it stays, or it turns along as a vector.
-enum class UnderRotation { stays, turns };
-
-struct Case {
-  std::vector<double> x,
-      p;  // the stencil's coordinates, away from degenerate shapes, and the parameters inside C
-  double compliance,
-      damping;  // of a size at which a and g matter for particles of about 20 g and substeps of about 4 ms
-  UnderRotation under_rotation;
-  int normal = -1;  // first of the three parameters that are a direction; then C only has to be symmetric about it
-  std::vector<int> relabeling;  // of the stencil, under which C becomes sign C, row by row, ...
-  std::vector<int> sign;
-  std::vector<int> parameter_sign;             // ... when the parameters take these signs
-  std::vector<int> parameter_relabeling = {};  // and these places; empty: their own
-  bool curved = true;                          // whether C has second derivatives
-};
 
 // Kinds whose last node is a number: of a joint's angle (joint_angle.h).
 template <class K>
@@ -570,18 +550,6 @@ inline Case case_of<TetrahedronVolume>() {
           .relabeling = {1, 2, 0, 3},
           .sign = {1},
           .parameter_sign = {1}};
-}
-
-// The same of a kind by its number, and its name.
-inline Case case_of(int kind) {
-  Case row;
-  with_kind(kind, [&]<class K>(K) { row = case_of<K>(); });
-  return row;
-}
-inline std::string kind_name(int kind) {
-  std::string name;
-  with_kind(kind, [&]<class K>(K) { name = K::name; });
-  return name;
 }
 
 // The kinds that a test of every kind goes through.

@@ -9,6 +9,7 @@
 #include "adjoint/solver/project_vjp.h"
 #include "core/constraints/any_kind.h"
 #include "core/solver/project.h"
+#include "tests/cpp/support/case.h"
 #include "tests/cpp/support/one_by_one.h"
 #include "tests/cpp/support/random_scene.h"
 
