@@ -36,11 +36,22 @@ def drafted(folder: Path, recording: sb.Recording, *options: str, bare: bool = T
     return last_line(result), (folder / "draft.toml").read_text()
 
 
-def fitted(folder: Path, file: str, *options: str, codes: tuple[int, ...] = (0,)) -> sb.FitResult:
-    """What comes of a shipped recording in two commands; 4 is the exit code of a fit with doubtful numbers."""
+def fitted(
+    folder: Path,
+    file: str,
+    *options: str,
+    codes: tuple[int, ...] = (0,),
+    times: tuple[tuple[float, float], tuple[float, float]] | None = None,
+) -> sb.FitResult:
+    """What comes of a shipped recording in two commands; 4 is the exit code of a fit with doubtful numbers. `times` are
+    what is fitted and held out instead of what the draft says: less of the recording, which takes less time."""
     draft = folder / "draft.toml"
     assert run("new", ROOT / "experiments" / file, "--output", draft, *options).exit_code == 0
-    draft.write_text(draft.read_text() + '\n[output]\nfigures = "none"\n')
+    text = draft.read_text()
+    for key, part in zip(("fit", "held_out"), times or (), strict=False):
+        text, count = re.subn(rf"(?m)^{key} = \[.*\]", f"{key} = {list(part)}", text)
+        assert count == 1, key
+    draft.write_text(text + '\n[output]\nfigures = "none"\n')
     result = run("fit", draft, "--output", folder / "out")
     assert result.exit_code in codes, result.output
     return sb.FitResult.load(folder / "out/fit.json")

@@ -162,9 +162,9 @@ def test_a_membrane_damping_that_is_missing_is_named() -> None:
     assert "drag loses energy that the model does not: with damping of cloth_membrane the fit" in said["cloth_warp"]
 
 
-@pytest.mark.parametrize("make", [dragged, thrown])
-def test_the_right_model_lacks_nothing(make: Callable[..., sb.Scene]) -> None:
-    for seed in range(2):
+@pytest.mark.parametrize(("make", "draws"), [(dragged, 2), (thrown, 1)])
+def test_the_right_model_lacks_nothing(make: Callable[..., sb.Scene], draws: int) -> None:
+    for seed in range(draws):
         assert asked(seen(make(), make(0.27, 1.2e-4), seed, whole=False)) == []
 
 
