@@ -237,7 +237,7 @@ class Climb:
         first = self.rope is None
         stays = found is not None and (first or (told is not None and told.stays))
         if found is not None:
-            self.tried.append(found)
+            self.tried.append(replace(found, slopes=None))  # which are large
             if stays:
                 self.rope = found
         self._note(rung.name, found, told, stays, began)
