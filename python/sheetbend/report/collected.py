@@ -40,6 +40,12 @@ class Trait:
     found: Population | None
     left_out: Mapping[str, str]
 
+    @property
+    def shows_spread(self) -> bool:
+        """Whether any spread explains how much the specimens differ; none does where they differ by less than their
+        intervals alone would make them."""
+        return self.found is None or self.found.spread_interval[1] > 0.0
+
     def told(self) -> tuple[str, ...]:
         """A row: parameter, specimens, mean, interval, unit, spread, interval."""
         p = self.found
@@ -49,7 +55,7 @@ class Trait:
         mean = [short(inverse(x), 4) for x in (p.mean, *p.mean_interval)]
         factor, unit = (100.0, " %") if self.log else (1.0, "")
         spread = [short(factor * x, 3) for x in (p.spread, *p.spread_interval)]
-        ends = f"[{spread[1]}, {spread[2]}]"
+        ends = f"[{spread[1]}, {spread[2]}]" if self.shows_spread else "not told"
         return (self.name, str(p.count), mean[0], f"[{mean[1]}, {mean[2]}]", self.unit, spread[0] + unit, ends)
 
 
@@ -79,6 +85,9 @@ class Collected:
         notes = [
             ("spread", "standard deviation between specimens, the errors of their fits taken out; % of logarithms")
         ]
+        if alike := [trait.name for trait in self.traits if not trait.shows_spread]:
+            why = "differ by less than their intervals alone would make them. Intervals also contain errors that all"
+            notes.append(("not told", f"{', '.join(alike)} {why} specimens share, such as that of the mesh"))
         for trait in self.traits:
             if trait.left_out:
                 told = ", ".join(f"{name} ({verdict})" for name, verdict in trait.left_out.items())
