@@ -29,6 +29,7 @@ PROTOCOLS = range(6)
 
 def stored(folder: Path, content: object, protocol: int = 4) -> Path:
     path = folder / "motion.pkl"
+    path.unlink(missing_ok=True)  # a file that is written over waits for the disk, a new one does not
     path.write_bytes(content if isinstance(content, bytes) else pickle.dumps(content, protocol=protocol))
     return path
 
