@@ -80,6 +80,20 @@ def test_a_towel_that_hangs_in_folds_is_as_large_as_its_rows(tmp_path: Path) -> 
     assert {name for given in cloth["set"] for name in given["markers"]} == {"m0", "m5"}
 
 
+def test_a_cloth_that_one_corner_holds(tmp_path: Path) -> None:
+    """A free corner was taken for a second hand, because the row between them is not straight."""
+    flat = grid(5, 5, 0.1, 0.1)
+    t = np.maximum(np.arange(301) / RATE - 0.4, 0.0)[:, None]
+    down, across = (flat[:, 0] - flat[:, 1]) / np.sqrt(2.0), (flat[:, 0] + flat[:, 1]) / np.sqrt(2.0)
+    fold = 0.7 * np.sin(across / 0.7)
+    swing = 0.15 * np.sin(4.0 * t) * (0.5 + down)
+    x = np.stack([fold + swing, 1.2 * across**2 + 0.05 * np.sin(3.0 * t) * (1.0 + down), 1.5 - down + 0.0 * t], axis=2)
+    found, content = drafted(tmp_path, x)
+    (cloth,) = content["scene"]["cloth"]
+    assert [grip["markers"] for grip in cloth["grip"]] == [["m0"]]
+    assert any("hangs down from it: the cloth is held there alone" in sentence for sentence in found.seen)
+
+
 def kicked(rest: float = 0.4) -> np.ndarray:
     """A line between two posts that hangs, is pushed at once, and swings about the line of the posts; 13 markers."""
     t = np.maximum(np.arange(501) / RATE - rest, 0.0)[:, None]

@@ -158,7 +158,7 @@ def holds(
         moves = not s.static and motion(x[:, row]) >= QUIET * moved
         corners = _sags(x, row)
         told = None if moves or corners else margin(x[:, numbers], flat, *SIDES[side])
-        markers = (row[0], row[-1]) if corners else tuple(row)
+        markers = _corners(s, row) if corners else tuple(row)
         beyond = 0.0 if told is None else told.length
         found.append(Hold(side, markers, corners, moves, beyond, True, margin=told))
     return found
@@ -266,6 +266,16 @@ def _sags(x: Array, row: list[int]) -> bool:
     share = np.einsum("fkx,fx->fk", line - line[:, :1], ends) / size[:, None] ** 2
     off = np.nanmean(line - line[:, :1] - share[..., None] * ends[:, None], axis=0)
     return bool(np.linalg.norm(off, axis=1).max() > SAGS * np.nanmean(size))
+
+
+def _corners(s: Seen, row: Sequence[int]) -> tuple[int, ...]:
+    """The ends of a row that sags between them; the upper one alone where the row hangs down from it to its other
+    end."""
+    height = np.nanmean(s.recording.positions[:, list(row)], axis=0) @ (-s.gravity / np.linalg.norm(s.gravity))
+    for upper, along in ((row[0], height), (row[-1], height[::-1])):
+        if along[0] - along[-1] > HANGS * s.apart[row[0], row[-1]] and (along[:-1] > along[-1]).all():
+            return (upper,)
+    return (row[0], row[-1])
 
 
 def _without_gaps(s: Seen, row: Sequence[int]) -> list[int]:

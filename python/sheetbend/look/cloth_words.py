@@ -40,6 +40,11 @@ def seen_of(s: Seen, sheet: Sheet, several: bool) -> list[str]:
         if not hold.own:
             how = "moves" if hold.moves else "stays in place"
             held.append(f"on what holds {what} and {how}: {of}")
+        elif hold.corners and len(hold.markers) == 1:
+            how = "moves" if hold.moves else "hardly moves"
+            held.append(
+                f"{of} {how}, and the {hold.side} row of markers hangs down from it: the cloth is held there alone"
+            )
         elif hold.corners:
             how = "move" if hold.moves else "hardly move"
             held.append(f"{of} {how}, and the {hold.side} row of markers sags between them: the cloth is held there")
