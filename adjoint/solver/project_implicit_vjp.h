@@ -22,23 +22,23 @@ bool has_rigid_rows(const BlockState<T>& state) {
 
 // z = K^-T z of some scenes, with y (rows of the block; of rigid ones alone) that is taken along; of others both are zero.
 template <class T>
-void solve_implicit(const DirectBlock& block, Scenes scenes, const BlockState<T>& state, std::vector<T>& z,
-                    std::vector<T>& y) {
+void solve_implicit(const Scene& whole, const DirectBlock& block, Scenes scenes, BlockState<T>& state,
+                    std::vector<T>& z, std::vector<T>& y) {
   for (int scene = 0; scene < static_cast<int>(state.implicit.size()); ++scene) {
     if (!has(scenes, scene)) continue;
-    const ImplicitBlock& implicit = state.implicit[scene];
+    ImplicitBlock& implicit = state.implicit[scene];
     const RigidRows& rigid = implicit.rigid();
     std::vector<Single<T>> mu(rigid.size());
     if constexpr (std::is_same_v<T, Pack>) {
       std::vector<double> own(z.size());
       for (std::size_t i = 0; i < z.size(); ++i) own[i] = z[i][scene];
       for (int j = 0; j < rigid.size(); ++j) mu[j] = y[rigid.row(j)][scene];
-      implicit.solve_transposed(block, own.data(), mu.data());
+      implicit.solve_transposed(whole, block, own.data(), mu.data());
       for (std::size_t i = 0; i < z.size(); ++i) z[i].set(scene, own[i]);
       for (int j = 0; j < rigid.size(); ++j) y[rigid.row(j)].set(scene, mu[j]);
     } else {
       for (int j = 0; j < rigid.size(); ++j) mu[j] = y[rigid.row(j)];
-      implicit.solve_transposed(block, z.data(), mu.data());
+      implicit.solve_transposed(whole, block, z.data(), mu.data());
       for (int j = 0; j < rigid.size(); ++j) y[rigid.row(j)] = mu[j];
     }
   }
@@ -172,7 +172,12 @@ void project_implicit_vjp(const SubstepState<T>& s, const DirectBlock& block, Sc
   const bool lifts = std::any_of(state.contacts.begin(), state.contacts.end(), [](const auto& c) { return c.lifts(); });
   const int passes = (has_rigid ? 3 : 2) + (lifts ? 3 : 0);
   for (int scene = 0; scene < static_cast<int>(state.implicit.size()); ++scene)
-    if (has(scenes, scene)) state.implicit[scene].factorize(s.scene, block);
+    if (has(scenes, scene)) {
+      if constexpr (is_plain<T>)
+        state.implicit[scene].prepare_transposed(s.scene, block);
+      else
+        state.implicit[scene].factorize(s.scene, block);
+    }
   for (auto& scene : bar.contacts) scene.clear();
   for (auto& scene : bar.friction) scene.clear();
   for (auto* gathered : {&bar.radii, &bar.weights}) std::fill(gathered->begin(), gathered->end(), T(0.0));
@@ -192,7 +197,7 @@ void project_implicit_vjp(const SubstepState<T>& s, const DirectBlock& block, Sc
   for (int pass = 0; pass < passes; ++pass) {
     for (std::size_t i = 0; i < p.size(); ++i) p[i] = bar.x[sheetbend_blocks::row * (i / 3) + i % 3];
     y = rest;
-    solve_implicit(block, scenes, state, p, y);
+    solve_implicit(s.scene, block, scenes, state, p, y);
     bar.y.clear();
     numbers_of_block(block, state, 0).subtract_times(p.data(), bar.y.data());
     if (has_rigid) {

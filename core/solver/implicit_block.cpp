@@ -24,6 +24,7 @@ constexpr double idle_share = 1e-2;
 // How far leaps go, of a whole step. Whole steps alone may lead back to the same kink again and again.
 constexpr double leap_shares[] = {1.0, 0.5, 2.0, 0.25, 1.5, 0.75, 0.35, 0.6};
 constexpr int most_leaps = static_cast<int>(std::size(leap_shares));
+constexpr double loosest_step = 1e-2, tightest_step = 1e-8;  // of what is left of R after a step by iterations
 constexpr double near_saddle = 1e-3;  // so little of the largest force is left where it may be a saddle's
 
 // The multipliers of rigid rows that leave the least of R at the solution x. What is left of it is rounding, which contacts make large: on the way back these
@@ -67,10 +68,19 @@ bool ImplicitBlock::slow() const {
   return k > first_ + 1 && balance_[k - 1] > 0.5 * balance_[k - 2];
 }
 
-// The matrix of a Newton step from x_, where the potential was looked at last.
-void ImplicitBlock::factorize_newton(const Scene& scene, const DirectBlock& block) {
+// The matrix of a Newton step from x_, where the potential was looked at last. Where friction acts it is factored once iterations have not done.
+void ImplicitBlock::find_matrix(const Scene& scene, const DirectBlock& block) {
   ++matrices_;
   matrix_.find(scene, block, potential, x_);
+  factored_ = !matrix_.rubs() || !rigid().empty();
+  if (factored_)
+    factorize_newton(scene, block);
+  else
+    convexity_ = 0.0;
+}
+
+void ImplicitBlock::factorize_newton(const Scene& scene, const DirectBlock& block) {
+  factored_ = true;
   if (!potential.by_merit()) {
     convexity_ = matrix_.factorize_convex_enough(scene, block);
     return;
@@ -85,14 +95,24 @@ void ImplicitBlock::factorize_newton(const Scene& scene, const DirectBlock& bloc
 }
 
 // The Newton step.
-void ImplicitBlock::take_direction(const DirectBlock& block) {
+void ImplicitBlock::take_direction(const Scene& scene, const DirectBlock& block) {
   for (std::size_t i = 0; i < d_.size(); ++i) d_[i] = -potential.R()[i];
   for (std::size_t j = 0; j < dl_.size(); ++j) dl_[j] = -rigid().residual(static_cast<int>(j));
-  find_step(block);
+  find_step(scene, block);
+}
+
+// What iterations may leave of R: about what Newton's method leaves by itself (Eisenstat & Walker 1996).
+double ImplicitBlock::step_tolerance() const {
+  const std::size_t k = balance_.size();
+  if (k < first_ + 2) return loosest_step;
+  const double share = balance_[k - 1] / balance_[k - 2];
+  return std::clamp(share * share, tightest_step, loosest_step);
 }
 
 // From the right sides in d_ and dl_.
-void ImplicitBlock::find_step(const DirectBlock& block) {
+void ImplicitBlock::find_step(const Scene& scene, const DirectBlock& block) {
+  if (!factored_ && matrix_.iterate(scene, block, step_tolerance(), false, d_.data())) return;
+  if (!factored_) factorize_newton(scene, block);
   if (rigid().empty()) return matrix_.solve(block, d_.data());
   rigid().solve(block, d_.data(), dl_.data(), [&](double* z) { matrix_.solve(block, z); }, enough_digits);
   for (double& l : dl_) l = -l;
@@ -222,7 +242,7 @@ bool ImplicitBlock::find_balance(const Scene& scene, const DirectBlock& block, c
         balance_rigid(block, potential, x_);
         return true;
       }
-      factorize_newton(scene, block);
+      find_matrix(scene, block);
       if (convexity_ == 0.0 || !leave_saddle(scene, block)) return true;
       continue;
     }
@@ -234,11 +254,11 @@ bool ImplicitBlock::find_balance(const Scene& scene, const DirectBlock& block, c
       lowest = merit_;
     }
     const bool was_convex = convexity_ > 0.0;
-    factorize_newton(scene, block);
+    find_matrix(scene, block);
     // Past a saddle the way is long with a matrix that was made convex.
     if (was_convex && convexity_ > 0.0 && slow() && balance_.back() < near_saddle && leave_saddle(scene, block))
       continue;
-    take_direction(block);
+    take_direction(scene, block);
     if (rigid().empty() && by_merit_ && leaps < most_leaps && stalls(last_leap)) {
       last_leap = balance_.size();
       const double there = look(block, leap_shares[leaps++]);
@@ -318,6 +338,17 @@ void ImplicitBlock::take_guess(const DirectBlock& block) {
 
 void ImplicitBlock::factorize(const Scene& scene, const DirectBlock& block) {
   matrix_.find(scene, block, potential, x_, true);
+  factorize_solution(scene, block);
+}
+
+void ImplicitBlock::prepare_transposed(const Scene& scene, const DirectBlock& block) {
+  matrix_.find(scene, block, potential, x_, true);
+  factored_ = !matrix_.rubs() || !rigid().empty();
+  if (factored_) factorize_solution(scene, block);
+}
+
+void ImplicitBlock::factorize_solution(const Scene& scene, const DirectBlock& block) {
+  factored_ = true;
   if (matrix_.symmetric() && matrix_.factorize(scene, block, 0.0)) return;
   potential.evaluate(block, x_);
   const bool has_lu = potential.by_merit() ? block.may_slide() : !matrix_.symmetric();

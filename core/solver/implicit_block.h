@@ -6,6 +6,7 @@
 #pragma once
 
 #include <stdexcept>
+#include <type_traits>
 #include <vector>
 
 #include "core/linear/conjugate_gradients.h"
@@ -51,6 +52,8 @@ class ImplicitBlock {
   // K at the solution, for derivatives: with the curvature of colliders. Throws Unbalanced where it is not positive definite, or has no inverse
   // where friction acts.
   void factorize(const Scene& scene, const DirectBlock& block);
+  // The same for transposed solves of plain numbers, which another pass refines: not factored where iterations are less work.
+  void prepare_transposed(const Scene& scene, const DirectBlock& block);
   // z = K^-1 z or K^-T z, three numbers per movable particle; z may be over a larger scalar. With rigid rows [z; mu] is that of the whole matrix (rigid_rows.h),
   // and Unbalanced is thrown where it has no digits.
   template <class U>
@@ -59,7 +62,10 @@ class ImplicitBlock {
     expect_digits(block, rigid().solve(block, z, mu, [&](U* dz) { matrix_.solve(block, dz); }, all_digits));
   }
   template <class U>
-  void solve_transposed(const DirectBlock& block, U* z, U* mu) const {
+  void solve_transposed(const Scene& scene, const DirectBlock& block, U* z, U* mu) {
+    if constexpr (std::is_same_v<U, double>)
+      if (!factored_ && matrix_.iterate(scene, block, refined_digits, true, z)) return;
+    if (!factored_) factorize_solution(scene, block);
     if (rigid().empty()) return matrix_.solve_transposed(block, z);
     expect_digits(block, rigid().solve(block, z, mu, [&](U* dz) { matrix_.solve_transposed(block, dz); }, all_digits));
   }
@@ -69,16 +75,20 @@ class ImplicitBlock {
   bool find_balance(const Scene& scene, const DirectBlock& block, const SolverOptions& options);
   bool raise_friction(const Scene& scene, const DirectBlock& block, const SolverOptions& options);
   static constexpr double all_digits = 1e-15,
-                          enough_digits = 1e-8;  // of multipliers, for derivatives and for Newton steps
-  static constexpr double sufficient = 1e-4;     // share of the slope's promise that a step has to keep (Armijo)
+                          enough_digits = 1e-8;   // of multipliers, for derivatives and for Newton steps
+  static constexpr double refined_digits = 1e-9;  // of iterations that another pass refines
+  static constexpr double sufficient = 1e-4;      // share of the slope's promise that a step has to keep (Armijo)
   void expect_digits(const DirectBlock& block, double share) const;
   void expect_none_passes(const DirectBlock& block, Numbers<double>& from, Numbers<double>& to) const;
   double look(const DirectBlock& block);
   double look(const DirectBlock& block, double t);
-  void find_step(const DirectBlock& block);
+  double step_tolerance() const;
+  void find_step(const Scene& scene, const DirectBlock& block);
   void take_first_step(const Scene& scene, const DirectBlock& block);
+  void find_matrix(const Scene& scene, const DirectBlock& block);
   void factorize_newton(const Scene& scene, const DirectBlock& block);
-  void take_direction(const DirectBlock& block);
+  void factorize_solution(const Scene& scene, const DirectBlock& block);
+  void take_direction(const Scene& scene, const DirectBlock& block);
   bool search_line(const DirectBlock& block, int most_trials);
   bool step_over_kinks(const Scene& scene, const DirectBlock& block, int most_matrices);
   bool go_down(const Scene& scene, const DirectBlock& block, int most_matrices);
@@ -100,6 +110,7 @@ class ImplicitBlock {
   bool by_merit_ = false;            // likewise, whether steps are judged by the merit
   double convexity_ = 0.0;  // of the last matrix: 0 for K, 1 where no constraint's share has negative eigenvalues
   int matrices_ = 0;
+  bool factored_ = false;  // the last matrix; where it is not, iterations are tried first
   std::size_t first_ = 0;  // of balance_ since Newton's method began, for the last time
 };
 

@@ -22,7 +22,7 @@ void ImplicitBlock::take_first_step(const Scene& scene, const DirectBlock& block
   }
   dl_ = lambda_;
   look(block);
-  factorize_newton(scene, block);
+  find_matrix(scene, block);
   z_.clear();
   bool moved = false;
   for (std::size_t i = row * block.movable; i < row * block.particles.size(); ++i) {
@@ -39,7 +39,7 @@ void ImplicitBlock::take_first_step(const Scene& scene, const DirectBlock& block
     rigid().add_softened(block, dl_.data(), d_.data());  // which K z has, being softened
     for (std::size_t j = 0; j < dl_.size(); ++j) dl_[j] = -(dl_[j] + rigid().residual(static_cast<int>(j)));
   }
-  find_step(block);
+  find_step(scene, block);
   move(guess, 1.0, d_, trial_);
   x_ = start;
   for (Numbers<double>* rows : {&x_, &trial_})

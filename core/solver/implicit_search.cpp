@@ -101,8 +101,9 @@ bool ImplicitBlock::search_where_it_rubs(const Scene& scene, const DirectBlock& 
   for (const double convexity : {1.0 / 8.0, 1.0}) {
     look(block);
     ++matrices_;
+    factored_ = true;
     if (!matrix_.factorize_unsymmetric(scene, block, convexity)) continue;
-    take_direction(block);
+    take_direction(scene, block);
     if (search_line(block, most_halvings_of_merit)) return true;
   }
   return false;
@@ -126,8 +127,8 @@ bool ImplicitBlock::step_over_kinks(const Scene& scene, const DirectBlock& block
     if (merit_ < (1.0 - sufficient) * merit) return true;
     const auto numbers = potential.contacts.numbers;
     if (hold_turning(block, potential, trial_.data(), x_.data())) look(block);
-    factorize_newton(scene, block);
-    take_direction(block);
+    find_matrix(scene, block);
+    take_direction(scene, block);
     potential.contacts.numbers = numbers;
   }
   x_ = x, lambda_ = lambda, d_ = d, dl_ = dl;

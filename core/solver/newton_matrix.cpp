@@ -68,6 +68,7 @@ void NewtonMatrix::resize(const Scene& scene, const DirectBlock& block) {
   contacts_.assign(9 * block.contacts.size(), 0.0);
   weights_.resize(block.contacts.size());
   if (block.may_slide()) lu_.resize(pattern_of(block).structure);
+  iteration_.resize(scene, block);
 }
 
 std::size_t NewtonMatrix::bytes(const Scene& scene, const DirectBlock& block) {
@@ -76,6 +77,7 @@ std::size_t NewtonMatrix::bytes(const Scene& scene, const DirectBlock& block) {
   std::size_t bytes = sizeof(double) * (block.movable + structure.size()) + Factor<double>::bytes(structure);
   bytes += sizeof(double) * (9 + most_point_nodes) * block.contacts.size();
   if (block.may_slide()) bytes += UnsymmetricFactor::bytes(structure);
+  bytes += NewtonIteration::bytes(block);
   for (const MemberRun& run : block.runs)
     bytes += 2 * (sizeof(Numbers<double>) + Numbers<double>::bytes(numbers_of(scene, run))) + sizeof(double*);
   return bytes;
@@ -89,7 +91,7 @@ void NewtonMatrix::find(const Scene& scene, const DirectBlock& block, Incrementa
   pack_kernels().potential->find_elements(arrays_);
   potential.add_rigid_elements(block, at, elements_);
   if (!curved) leave_out_idle(scene, block, at, elements_);
-  convex_found_ = false;
+  convex_found_ = iteration_found_ = false;
   find_contacts(block, potential.contacts, at.data(), curved);
   find_pairs(scene, block, potential, at.data());
 }
@@ -97,13 +99,16 @@ void NewtonMatrix::find(const Scene& scene, const DirectBlock& block, Incrementa
 void NewtonMatrix::find_contacts(const DirectBlock& block, const BlockContacts<double>& contacts, const double* x,
                                  bool curved) {
   symmetric_ = true;
+  rubs_ = false;
   weights_ = contacts.weights;
   for (int i = 0; i < static_cast<int>(block.contacts.size()); ++i) {
     const Pose<double>& pose = contacts.pose(block, i);
     const Vec3<double> z = pose.in_frame(contacts.point(block, i, x));
     double A[9], AR[9], *M = &contacts_[9 * i];
     std::fill_n(M, 9, 0.0);
-    if (!touch_matrix(block.contacts[i].shape, z, contacts.numbers[i], curved, A).pushes) continue;
+    const Touch<double> touch = touch_matrix(block.contacts[i].shape, z, contacts.numbers[i], curved, A);
+    if (!touch.pushes) continue;
+    rubs_ |= touch.rubs;
     const double* R = pose.turn;  // M = R A R^T
     for (int a = 0; a < 3; ++a)
       for (int b = 0; b < 3; ++b)
@@ -248,11 +253,37 @@ double NewtonMatrix::factorize_convex_enough(const Scene& scene, const DirectBlo
   return 1.0;
 }
 
-void NewtonMatrix::multiply(const DirectBlock& block, Numbers<double>& z, Numbers<double>& Kz) {
+bool NewtonMatrix::iterate(const Scene& scene, const DirectBlock& block, double tolerance, bool transposed, double* z) {
+  if (!rubs_ || !iterates_ || !NewtonIteration::serves(block)) return false;
+  if (!iteration_found_) iteration_.find(scene, block, masses_, elements_, contacts_);
+  iteration_found_ = true;
+  if (!iteration_.pays(tolerance)) return false;
+  const auto multiply = [&](Numbers<double>& p, Numbers<double>& q) {
+    multiply_held(block, p, q);
+    const double* from = p.data();
+    double* to = q.data();
+    for (std::size_t i = 0; i < block.contacts.size(); ++i) {
+      const int at = row * block.contacts[i].particles[0];
+      for (int a = 0; a < 3; ++a)
+        for (int b = 0; b < 3; ++b)
+          to[at + a] += contacts_[9 * i + (transposed ? 3 * b + a : 3 * a + b)] * from[at + b];
+    }
+  };
+  iterates_ = iteration_.solve(tolerance, transposed, multiply, z);
+  return iterates_;
+}
+
+void NewtonMatrix::multiply_held(const DirectBlock& block, Numbers<double>& z, Numbers<double>& Kz) {
   Kz.clear();
+  const double* from = z.data();
+  double* to = Kz.data();
   for (int p = 0; p < block.movable; ++p)
-    for (int d = row * p; d < row * p + 3; ++d) Kz[d] = masses_[p] * z[d];
+    for (int d = row * p; d < row * p + 3; ++d) to[d] = masses_[p] * from[d];
   pack_kernels().potential->multiply(arrays_, z.numbers(), Kz.numbers());
+}
+
+void NewtonMatrix::multiply(const DirectBlock& block, Numbers<double>& z, Numbers<double>& Kz) {
+  multiply_held(block, z, Kz);
   for_each_contact(block, [&](int p, int q, double weight, const double* M) {
     for (int a = 0; a < 3; ++a)
       for (int b = 0; b < 3; ++b) Kz[row * p + a] += weight * M[3 * a + b] * z[row * q + b];

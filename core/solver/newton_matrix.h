@@ -13,6 +13,7 @@
 
 #include "core/linear/unsymmetric_factor.h"
 #include "core/solver/incremental_potential.h"
+#include "core/solver/newton_iteration.h"
 #include "core/solver/paired_pattern.h"
 
 namespace sheetbend {
@@ -26,12 +27,13 @@ class NewtonMatrix {
   static std::size_t bytes(const Scene& scene, const DirectBlock& block);
 
   // A substep begins: the pattern is that of its pairs alone, so that bits do not depend on where a rollout begins.
-  void begin() { begins_ = true; }
+  void begin() { begins_ = iterates_ = true; }
 
   // K at `at`; Newton's method does without the curvature of colliders and what frames do along idle directions (block_frames.h), derivatives do not.
   void find(const Scene& scene, const DirectBlock& block, IncrementalPotential& potential, Numbers<double>& at,
             bool curved = false);
   bool symmetric() const { return symmetric_; }
+  bool rubs() const { return rubs_; }  // whether friction of contacts acts
 
   // Factors K so much of the way to the convex matrix, from 0 for K itself to 1. Says whether that is positive definite.
   bool factorize(const Scene& scene, const DirectBlock& block, double convexity);
@@ -56,6 +58,10 @@ class NewtonMatrix {
     in_places(block, z,
               [&](const CondensedPattern& pattern, U* room) { lu_.solve_transposed(pattern.structure, room); });
   }
+
+  // z = K^-1 z or K^-T z without a factor, so that no more than this share of z is left, three numbers per movable particle. False, with z as it was,
+  // where friction does not act or a factor is less work.
+  bool iterate(const Scene& scene, const DirectBlock& block, double tolerance, bool transposed, double* z);
 
   // Kz = K z on rows of four; of fixed particles what the constraints alone make of it.
   void multiply(const DirectBlock& block, Numbers<double>& z, Numbers<double>& Kz);
@@ -106,7 +112,8 @@ class NewtonMatrix {
           spots_.for_each_node(pair.spots[l], [&](int q, double c) { f(p, q, b * c, k, l); });
         });
   }
-  void assemble(const Scene& scene, const DirectBlock& block, double convexity);  // without contacts and pairs
+  void assemble(const Scene& scene, const DirectBlock& block, double convexity);          // without contacts and pairs
+  void multiply_held(const DirectBlock& block, Numbers<double>& z, Numbers<double>& Kz);  // likewise
 
   sheetbend_blocks::Potential arrays_{};            // of the last find()
   std::vector<double> masses_;                      // per movable particle
@@ -125,7 +132,10 @@ class NewtonMatrix {
   Spots<double> spots_;
   std::vector<PairKey> in_pattern_;
   std::optional<PairedPattern> paired_;
-  bool convex_found_ = false, symmetric_ = true, as_lu_ = false, begins_ = true;
+  bool convex_found_ = false, symmetric_ = true, rubs_ = false, as_lu_ = false, begins_ = true;
+  NewtonIteration iteration_;
+  bool iteration_found_ = false;  // of the last find()
+  bool iterates_ = true;          // whether it has not failed in this substep
   Factor<double> factor_;
   UnsymmetricFactor lu_;
 };

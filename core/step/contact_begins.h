@@ -1,24 +1,32 @@
 // Where a contact begins in a substep: its point is inside the surface at the end, or as low as restitution lifts it, and was not inside at the
-// start. By values, of which nothing is differentiated.
+// start. By values, of which nothing is differentiated. A contact so soft that substeps follow its vibration is a force as others are, and does not count.
 #pragma once
 
 #include "core/step/step.h"
 
 namespace sheetbend {
 
+// omega h of such a contact, at most; omega^2: its stiffness times the inverse mass of its point.
+inline constexpr double followed = 0.5;
+
 template <class T>
-Scenes where_contact_begins(const Step<T>& step, const T* x_next) {
+Scenes where_contact_begins(const Step<T>& step, const InverseMasses<T>& masses, const T* x_next) {
   const Scene& scene = step.scene;
   Scenes begun = 0;
   for (int lane = 0; lane < scenes_of<T>; ++lane) {
     if (!has(step.scenes, lane)) continue;
-    const ContactSource<T> source{scene, step.in, step.bdf, step.t_next, step.plan.options.h, step.from, nullptr, lane};
+    const auto source = contact_source(step, masses, lane);
+    const auto is_followed = [&](const Contact& c, int item) {
+      if (c.stiffness < 0) return false;
+      const double stiffness = value_of(source.read(step.in.of(Quantity::contact_stiffness)[c.stiffness]));
+      return stiffness * value_of(source.inverse_mass(c, item)) * source.h * source.h <= followed * followed;
+    };
     const auto poses = source.poses();
     const auto begins = [&](const Contact& c, int contact, int item) {
       double above = 0.0;
       if (c.rebounds(item))
         if (const auto r = source.rebound(poses, contact, item); r.lifts) above = value_of(r.lift);
-      return moves(scene, c, item) &&
+      return moves(scene, c, item) && !is_followed(c, item) &&
              value_of(source.gap(poses.next[c.collider], contact, source.point(c, item, x_next))) < above &&
              !(value_of(source.gap(poses.now[c.collider], contact, source.point(c, item, step.from.x))) < 0.0);
     };

@@ -315,6 +315,51 @@ TEST(Contact, HasTheGradientOfDifferencesAroundASmallBall) {
   }
 }
 
+// A cloth that falls over a ball and slides, with springs that are not much stiffer than its inertia.
+Sample cloth_on_a_ball(int columns) {
+  ContactBuilder b;
+  const double apart = 0.01;
+  for (int i = 0; i < columns; ++i)
+    for (int j = 0; j < columns; ++j)
+      b.particle({apart * (i - 0.4 * columns), apart * (j - 0.5 * columns), 0.1}, 1e-3, {0.5, 0.1, -0.3});
+  const auto spring = [&](int p, int q, double k) {
+    b.constraint("distance", {p, q}, 1.0 / k, {norm(Vec3<double>(&b.x[3 * p]) - Vec3<double>(&b.x[3 * q]))});
+  };
+  for (int p = 0; p < columns * columns; ++p) {
+    const bool right = p % columns + 1 < columns, below = p + columns < columns * columns;
+    if (right) spring(p, p + 1, 40.0);
+    if (below) spring(p, p + columns, 40.0);
+    if (right && below) spring(p, p + columns + 1, 20.0);
+  }
+  b.collider("sphere", {0.1}, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0});
+  b.contact(0.3, 0.0, 100.0, -1.0, 20.0);
+  return b.build(g);
+}
+
+// Newton's steps and the reverse go by iterations there (core/solver/newton_iteration.h), complex steps by a factor.
+TEST(Contact, HasTheGradientOfComplexStepsWhereNewtonIterates) {
+  const Sample s = cloth_on_a_ball(24);
+  const Layout& layout = s.scene.layout;
+  Random random(23);
+  for (const Integrator integrator : {Integrator::bdf1, Integrator::bdf2}) {
+    const Program p = moving_program(s, contact_options(1e-3, integrator), 5);
+    EXPECT_GT(modes_of(p, s.inputs).slid, 20);
+    const auto found = gradient(p, s.inputs);
+    for (int q = 0; q < quantity_count; ++q) {
+      std::vector<Complex> probe(s.inputs.begin(), s.inputs.end());
+      double along = 0.0, size = 0.0;
+      for (std::size_t i = layout.offset[q]; i < layout.offset[q + 1]; ++i) {
+        const double direction = random(-1.0, 1.0);
+        probe[i].im = complex_step * direction;
+        along += direction * found[i];
+        size += std::abs(direction * found[i]);
+      }
+      if (size > 0.0) EXPECT_NEAR(loss(p, probe).im / complex_step, along, 1e-8 * size) << quantity_names[q];
+    }
+    if (integrator == Integrator::bdf2) expect_bits_of_any_tape(p, s.inputs);
+  }
+}
+
 // Steps over kinks of friction that are as long as Newton's led round in a circle here, for 95 matrices.
 TEST(Contact, LeapsOverKinksWithoutComingBack) {
   constexpr int links = 11;
