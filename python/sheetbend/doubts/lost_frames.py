@@ -15,6 +15,7 @@ import numpy as np
 from ..arrays.timeseries import Array
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
+from ..statistics.covariance import Integers
 from ..statistics.gauge import RANK_TOLERANCE
 from .told import LATER, Told
 
@@ -51,7 +52,7 @@ def lost_frames(problem: FitProblem, q: Array, r: Array, told: Sequence[Told]) -
                 )
 
 
-def _likeliest(frame: Array, column: Array, q: Array, r: Array) -> tuple[int, float]:
+def _likeliest(frame: Integers, column: Array, q: Array, r: Array) -> tuple[int, float]:
     """The frame from which on residuals ask the most for the change, and for how much of it."""
 
     def summed(each: Array) -> Array:

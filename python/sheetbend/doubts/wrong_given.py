@@ -157,8 +157,8 @@ def _asked(
         if not left > 0.0:
             continue
         much, allowed = left > LEAVES * data, max(float(r[mine] @ r[mine]) - left, float(np.count_nonzero(mine)))
-        more = [*lacking.of(group), *lost_frames(problem, q, r, told)] if much else []
-        tried = list(_directions(problem, [*told, *more], group))
+        without_number = [*lacking.of(group), *lost_frames(problem, q, r, told)] if much else []
+        tried = list(_directions(problem, [*told, *without_number], group))
         asked, sure = likely(tried, mine, left, MOST), True
         if asked and not much and (parts := lacking.beside_contacts(group)):
             asked = likely([*tried, *_directions(problem, parts, group)], mine, left, MOST) or asked
