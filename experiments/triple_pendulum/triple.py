@@ -1,0 +1,159 @@
+"""Three rigid bodies on hinges, as twins of a triple pendulum: inertia, centers and viscosities from swings.
+
+    python experiments/triple_pendulum/triple.py [--draws 1]
+
+The recordings come from the equations of Lagrange in the three angles, integrated by an explicit method of eighth
+order, not from the simulator. Each draw of the noise is fitted to two pieces, and two others are predicted from their
+first samples.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+import sheetbend as sb
+from scipy.integrate import solve_ivp
+
+MASS, LENGTH = np.array([0.23, 0.25, 0.22]), np.array([0.17, 0.17, 0.17])  # kg, m from hinge to hinge
+CENTER, MOMENT = np.array([0.10, 0.10, 0.08]), np.array([1.0e-3, 1.1e-3, 0.9e-3])  # m, kg m^2 about the centers
+VISCOSITY = np.array([4e-4, 3e-4, 3e-4])  # N m s/rad
+NOISE = 3e-4  # m, of each coordinate of a marker
+RATE, SECONDS, FIRST = 100, 1.5, 0.3  # Hz; s of a piece; s from which a piece is predicted
+STARTS = {  # rad and rad/s of each arm, from straight down
+    "fitted 1": [0.9, 0.6, 1.2, 0.0, 1.0, -2.0],
+    "fitted 2": [-0.7, -1.3, -0.4, 2.0, -1.0, 0.0],
+    "predicted 1": [1.2, 0.8, 0.5, -1.0, 0.0, 1.5],
+    "predicted 2": [0.4, -0.9, -1.2, 0.0, 1.0, 0.0],
+}
+SOLVER = sb.Solver(h=1 / 200, extrapolate=3)
+TRUTH = {
+    **{f"arm{k}_inertia_3": MOMENT[k] for k in range(3)},
+    "arm0_center_x": CENTER[0],
+    "arm1_center_x": CENTER[1],
+    **{f"hinge{k}_viscosity": VISCOSITY[k] for k in range(3)},
+}
+"""What a swing shows beside the masses and the last arm's center, which set the scale."""
+BEGIN = (1.3, 0.8, 1.3, 0.9, 1.1, 2.0, 0.5, 2.0)  # times the truth, where the fit starts
+OFF = np.full(6, 0.03)  # rad and rad/s, by which angles and rates are off where the fit starts
+OWN = {f"hinge{k}_{key}": unit for key, unit in (("angle", "rad"), ("rate", "rad/s")) for k in range(3)}
+PLACES = [(0.5, 0.02), (1.0, 0.0)]  # of markers, in parts of an arm's length and m across it
+
+
+def slope(_: float, y: np.ndarray) -> np.ndarray:
+    """Rates of angles and rates."""
+    angles, rates = y[:3], y[3:]
+    arms = np.tril(np.tile(LENGTH, (3, 1)), -1) + np.diag(CENTER)  # of each center, to each angle
+    coupled = np.einsum("i,ij,ik->jk", MASS, arms, arms)
+    apart = angles[:, None] - angles
+    drag = VISCOSITY * np.diff(rates, prepend=0.0)
+    torque = -(coupled * np.sin(apart)) @ rates**2 - 9.81 * (MASS @ arms) * np.sin(angles) - drag
+    torque[:-1] += drag[1:]
+    return np.concatenate([rates, np.linalg.solve(coupled * np.cos(apart) + np.diag(MOMENT), torque)])
+
+
+def swing(start: list[float]) -> np.ndarray:
+    """(frames, 3) rad, the angles of a piece."""
+    t = np.arange(round(SECONDS * RATE) + 1) / RATE
+    found = solve_ivp(slope, (0.0, SECONDS), start, method="DOP853", t_eval=t, rtol=1e-12, atol=1e-12)
+    return np.asarray(found.y[:3].T)
+
+
+def along(angles: np.ndarray) -> np.ndarray:
+    return np.stack([np.sin(angles), 0.0 * angles, -np.cos(angles)], axis=-1)
+
+
+def markers(angles: np.ndarray) -> np.ndarray:
+    """(frames, 6, 3) m."""
+    d, across = along(angles), along(angles + np.pi / 2.0)
+    tops = np.cumsum(LENGTH[:, None] * d, axis=1) - LENGTH[:, None] * d
+    on = [tops + part * LENGTH[:, None] * d + off * across for part, off in PLACES]
+    return np.stack(on, axis=2).reshape(len(angles), -1, 3)
+
+
+def scene_of(start: np.ndarray, values: dict[str, float]) -> tuple[sb.Scene, list[sb.Place]]:
+    """Three bodies on hinges about y, and where their markers are."""
+    scene, top, upper, places = sb.Scene("triple pendulum"), np.zeros(3), None, []
+    rates = np.diff(start[3:], prepend=0.0)
+    for k in range(3):
+        d, across = along(start[k]), along(start[k] + np.pi / 2.0)
+        moment = values[f"arm{k}_inertia_3"]
+        arm = scene.add_body(
+            f"arm{k}",
+            mass=MASS[k],
+            inertia=[1e-3, 1e-3, moment],
+            center=(values.get(f"arm{k}_center_x", CENTER[k]), 0.0, 0.0),
+            at=top,
+            rotation=np.stack([d, across, [0.0, -1.0, 0.0]], axis=1),
+        )
+        viscosity = values[f"hinge{k}_viscosity"]
+        sb.hinge(upper, arm, at=top, axis=(0.0, -1.0, 0.0), name=f"hinge{k}", rate=rates[k], viscosity=viscosity)
+        upper, top = arm, top + LENGTH[k] * d
+        places += sb.on_body(arm, [(part * LENGTH[k], off, 0.0) for part, off in PLACES])
+    return scene, places
+
+
+def experiment(name: str, x: np.ndarray) -> sb.Experiment:
+    """A piece; of one that is predicted, the first samples alone are data."""
+    begin = {key: value * share for (key, value), share in zip(TRUTH.items(), BEGIN, strict=True)}
+    scene, places = scene_of(np.array(STARTS[name]) + OFF, begin)
+    seen = sb.Recording(x, np.arange(len(x)) / RATE, name=name)
+    part = {"fit": (0.0, FIRST), "held_out": (FIRST, SECONDS)} if name.startswith("predicted") else {}
+    return sb.Experiment(
+        scene=scene, recording=seen, markers=places, solver=SOLVER, start_time=0.0, sigma=NOISE, name=name, **part
+    )
+
+
+def fitted(pieces: dict[str, np.ndarray]) -> sb.FitResult:
+    own = [sb.Parameter(name=name, private=True, unit=unit, scale=0.1) for name, unit in OWN.items()]
+    experiments = [experiment(name, x) for name, x in pieces.items()]
+    return sb.fit(experiments, parameters=[*TRUTH, *own], windows=[], refine=False, profiles=False)
+
+
+def missed(result: sb.FitResult, clean: dict[str, np.ndarray]) -> dict[str, float]:
+    """Of each predicted piece, the rms distance along one coordinate between predicted and noisy markers in the plane,
+    after its first samples, over the noise."""
+    found = {}
+    for name, x in clean.items():
+        if not name.startswith("predicted"):
+            continue
+        values = {key: result.values[key] for key in TRUTH}
+        values |= {key: result.values[f"{key}[{name}]"] for key in OWN}
+        scene, places = scene_of(np.array(STARTS[name]) + OFF, values)
+        motion = sb.simulate(scene, np.arange(len(x)) / RATE, SOLVER, {key: values[key] for key in OWN})
+        x_found = []
+        for place in places:
+            origin, frame = place.body.pose(motion)
+            x_found.append(origin + frame @ np.array(place.offset))
+        off = (np.stack(x_found, axis=1) - x)[round(FIRST * RATE) + 1 :, :, [0, 2]]
+        found[name] = float(np.hypot(np.sqrt((off**2).mean()), NOISE) / NOISE)
+    return found
+
+
+def main(draws: int) -> None:
+    clean = {name: markers(swing(start)) for name, start in STARTS.items()}
+    rng = np.random.default_rng(1)
+    inside, off = dict.fromkeys(TRUTH, 0), []
+    for draw in range(draws):
+        noisy = {name: x + NOISE * rng.standard_normal(x.shape) for name, x in clean.items()}
+        result = fitted(noisy)
+        off.append(list(missed(result, clean).values()))
+        outside = []
+        for name, value in TRUTH.items():
+            one = result[name]
+            holds = one.lower is not None and one.upper is not None and bool(one.lower <= value <= one.upper)
+            inside[name] += holds
+            outside += [] if holds else [name]
+            if draw == 0:
+                width = np.inf if one.half_width is None else one.half_width
+                print(f"{name:18s} {value:8.4g}  fitted {one.value:9.5g} +- {width:8.2g}  {one.verdict}")
+        told, without = ", ".join(f"{a:.2f}" for a in off[-1]), ", ".join(outside) or "none"
+        print(f"draw {draw}: predicted pieces off by {told} times the noise; intervals without the truth: {without}")
+    print(f"intervals that hold the truth, of {draws}: {inside}")
+    print(f"largest error of a predicted piece: {np.max(off):.2f} times the noise")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--draws", type=int, default=1)
+    main(parser.parse_args().draws)
