@@ -15,8 +15,8 @@ import numpy as np
 from ..arrays.timeseries import Array
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
-from ..statistics.covariance import Integers
 from ..statistics.gauge import RANK_TOLERANCE
+from ..statistics.layout import Integers
 from .told import LATER, Told
 
 LOST = "frames lost"
