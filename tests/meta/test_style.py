@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -13,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @pytest.mark.parametrize("tool", ["ruff check", "ruff format --check", pytest.param("mypy", marks=pytest.mark.slow)])
 def test_passes(tool: str, tmp_path: Path) -> None:
-    cache = ["--cache-dir", str(tmp_path)]
+    cache = ["--cache-dir", os.devnull if tool == "mypy" else str(tmp_path)]  # which mypy would take seconds to fill
     command = [sys.executable, "-m", *tool.split(), *cache, *([] if tool == "mypy" else ["."])]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
