@@ -65,6 +65,12 @@ PairNumbers<S> rub_vjp(bool triangle, Part part, const S* x, const PairNumbers<S
   return {sum.d[touching], sum.d[kappa]};
 }
 
+// Compiled once, for plain rollouts and for scenes in lanes (block_pairs_vjp.cpp).
+extern template PairNumbers<double> meet_vjp(bool, Part, const double*, const PairNumbers<double>&, const double*,
+                                             double*, double*);
+extern template PairNumbers<double> rub_vjp(bool, Part, const double*, const PairNumbers<double>&, const Rub<double>&,
+                                            const double*, const Vec3<double>&, double*, double*, Rub<double>&);
+
 // The reverse of Spots::at: a cotangent of where a spot is goes to its nodes, by to(node, cotangent), and to its weights, by weight(i, cotangent) in their
 // order. at(node) are its nodes'.
 template <class S, class At, class To, class Weight>

@@ -2,6 +2,7 @@
 //   e_bar = f b + (y/|e|^3) (e.b) e,   y_bar = -(e.b)/|e|,   set_bar = b - e_bar,   x_bar = J^T e_bar.
 #pragma once
 
+#include "adjoint/element/any_kind_vjp.h"
 #include "adjoint/element/constraint_vjp.h"
 #include "adjoint/step/stages.h"
 #include "core/step/retract_directors.h"
@@ -36,7 +37,10 @@ void let_slide_vjp(const Scene& scene, const Inputs<const T>& in, const T* state
 
     // de/dset = -1; with a share e = C - (1 - share) set, where C holds -share set: by the share 0
     T by_x[K::dofs]{}, by_p[parameter_count<K>]{};
-    values_vjp<Slider<K>>(at.x, p, e_bar, by_x, by_p);
+    if constexpr (std::is_same_v<Slider<K>, K>)
+      values_vjp(group.kind, at.x, p, e_bar, by_x, by_p);
+    else
+      values_vjp<Slider<K>>(at.x, p, e_bar, by_x, by_p);
     for (int d = 0; d < at.set; ++d) x_bar[scene.first_dof[nodes[d / 3]] + d % 3] += by_x[d];
     for (int j = 0; j < K::rows; ++j) set_bar(j) -= e_bar[j];
     if constexpr (shares_load<K>) by_p[K::share_parameter] = T(0.0);

@@ -25,6 +25,7 @@ struct AnyKind {
   bool balances;
   void (*evaluate)(const T* x, const T* p, T* C, T* J);
   T (*difference)(const T& a, const T& b);
+  void (*values)(const T* x, const T* p, T* C);  // C alone
 };
 
 // For the scalars of any_kind_*.cpp; other scalars include any_kind_impl.h.

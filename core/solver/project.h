@@ -2,6 +2,7 @@
 // Here for a color of blocks of one; project_block.h is for a direct block. Both go through Element.
 #pragma once
 
+#include "core/constraints/any_kind.h"
 #include "core/solver/placed.h"
 #include "core/solver/plan.h"
 #include "core/solver/states.h"
@@ -26,21 +27,44 @@ struct IterationRecord {
 template <class T>
 void damping_references(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, const SubstepStates<T>& s,
                         T* C_r) {
+  T x[largest_kind.dofs], before[largest_kind.rows];
+  for (const Group& group : scene.groups) {
+    if (!group.damped) continue;
+    const AnyKind<T>& kind = any_kind<T>(group.kind);
+    for (int i = 0; i < group.count; ++i) {
+      const auto nodes = group.nodes(i);
+      const T* p = in.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(i) * group.parameters;
+      const auto find_values = [&](const T* state, T* C) {
+        for (int d = 0; d < kind.dofs; ++d) x[d] = state[scene.first_dof[nodes[d / 3]] + d % 3];
+        kind.values(x, p, C);
+      };
+      T* C = C_r + group.first_row + i * kind.rows;
+      find_values(s.x, C);
+      if (bdf.before == 0.0) continue;
+      find_values(s.x_before, before);
+      for (int j = 0; j < kind.rows; ++j) C[j] = C[j] - T(bdf.before) * kind.difference(C[j], before[j]);
+    }
+  }
+}
+
+// The same for plain numbers, compiled per kind: through tables, damped sweeps would take a sixth longer forward. Other scalars gain by them.
+inline void damping_references(const Scene& scene, const Inputs<const double>& in, const Bdf& bdf,
+                               const SubstepStates<double>& s, double* C_r) {
   for (const Group& group : scene.groups) {
     if (!group.damped) continue;
     with_kind(group.kind, [&]<class K>(K) {
       for (int i = 0; i < group.count; ++i) {
-        T x[K::dofs], x_before[K::dofs];
+        double x[K::dofs], x_before[K::dofs];
         const int* nodes = group.stencil.data() + static_cast<std::size_t>(i) * K::arity;
         for (int k = 0; k < K::arity; ++k) {
           std::copy_n(s.x + scene.first_dof[nodes[k]], 3, x + 3 * k);
           std::copy_n(s.x_before + scene.first_dof[nodes[k]], 3, x_before + 3 * k);
         }
-        const T* p = in.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(i) * parameter_count<K>;
-        const Evaluation<K, T> now(x, p), before(x_before, p);
+        const double* p = in.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(i) * parameter_count<K>;
+        const Evaluation<K, double> now(x, p), before(x_before, p);
         for (int j = 0; j < K::rows; ++j)
           C_r[group.first_row + i * K::rows + j] =
-              bdf.before == 0.0 ? now.C[j] : now.C[j] - T(bdf.before) * difference<K>(now.C[j], before.C[j]);
+              bdf.before == 0.0 ? now.C[j] : now.C[j] - bdf.before * difference<K>(now.C[j], before.C[j]);
       }
     });
   }

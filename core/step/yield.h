@@ -91,14 +91,20 @@ void let_slide(const Scene& scene, const Inputs<const T>& in, T* state) {
   });
 }
 
+// Parameters that C of the sliding spring depends on otherwise than by subtracting them.
+template <class K>
+inline constexpr int inside_slider = parameter_count<K> - Slider<K>::offsets;
+
+// The derivatives (rows, inside_slider) of C of the sliding spring by these, at its coordinates. Compiled once per kind, in yield.cpp.
+void slider_by_parameters(int kind, const double* x, const double* p, double* by_p);
+
 // Along N directions, where it slides: those of coordinates go through the gradient, those of parameters inside C through duals.
 template <int N>
 void let_slide(const Scene& scene, const Inputs<const Dual<double, N>>& in, Dual<double, N>* state) {
   using Directed = Dual<double, N>;
   if (!scene.yields) return;
   for_each_yielding(scene, [&]<class K>(K, const Group& group, int item, std::size_t value) {
-    using Sliding = Slider<K>;
-    constexpr int P = parameter_count<K>, inside = P - Sliding::offsets, set = K::dofs - 3 * set_nodes<K>;
+    constexpr int P = parameter_count<K>, inside = inside_slider<K>, set = K::dofs - 3 * set_nodes<K>;
     const Directed* p = in.of(Quantity::rest) + value;
     const auto nodes = group.nodes(item);
     const auto at = [&](int d) -> Directed& { return state[scene.first_dof[nodes[d / 3]] + d % 3]; };
@@ -111,22 +117,15 @@ void let_slide(const Scene& scene, const Inputs<const Dual<double, N>>& in, Dual
     bool varies = false;
     for (int k = 0; k < inside; ++k)
       for (int i = 0; i < N; ++i) varies |= k != K::yield_parameter && p[k].d[i] != 0.0;
-    using ByParameter = Dual<double, inside>;
-    ByParameter C[K::rows]{};
-    if (varies) {
-      ByParameter xd[K::dofs], pd[P], J[K::rows * K::dofs];
-      for (int d = 0; d < K::dofs; ++d) xd[d].v = values.x[d];
-      for (int k = 0; k < P; ++k) pd[k].v = own[k];
-      for (int k = 0; k < inside; ++k) pd[k].d[k] = 1.0;
-      Sliding::evaluate(xd, pd, C, J);
-    }
+    double by_p[K::rows * inside]{};
+    if (varies) slider_by_parameters(group.kind, values.x, own, by_p);
     Directed e[K::rows];
     for (int j = 0; j < K::rows; ++j) {
       e[j].v = values.C[j];
       for (int i = 0; i < N; ++i) {
         double sum = 0.0;
-        if constexpr (Sliding::offsets > 0) sum = -p[inside + j].d[i];
-        for (int k = 0; k < inside; ++k) sum += C[j].d[k] * p[k].d[i];
+        if constexpr (Slider<K>::offsets > 0) sum = -p[inside + j].d[i];
+        for (int k = 0; k < inside; ++k) sum += by_p[j * inside + k] * p[k].d[i];
         for (int d = 0; d < K::dofs; ++d) sum += values.J[j * K::dofs + d] * at(d).d[i];
         e[j].d[i] = sum;
       }
