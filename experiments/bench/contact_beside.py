@@ -1,11 +1,12 @@
 """Contact in this package and in newton on the same scene, in one run: time, error at the end, gradients.
 
-    python experiments/bench/contact_beside.py FOLDER [--scenes rope cloth] [--columns 32]
+    python experiments/bench/contact_beside.py FOLDER [--scenes rope cloth] [--columns 32] [--peers ...] [--forward]
 
-FOLDER holds the environment `newton` (setup_peers.sh FOLDER newton). Times are processor time of one thread. The error
-is the largest distance of a particle, at the end, from a run of the same program at an eighth of its shortest substep,
-for newton of its law in double precision. Gradients are of one number, a weighted sum of the positions at the end, with
-respect to the logarithms of friction and of all stiffnesses, and along a direction of the start and of its velocities.
+FOLDER holds the environment `newton` (setup_peers.sh FOLDER newton). Peers are its solvers: semi_implicit (default),
+xpbd, vbd. Times are processor time of one thread. The error is the largest distance of a particle, at the end, from a
+run of the same program at an eighth of its shortest substep, for semi_implicit of its law in double precision.
+Gradients are of one number, a weighted sum of the positions at the end, with respect to the logarithms of friction and
+of all stiffnesses, and along a direction of the start and of its velocities. `--forward` leaves them out.
 Prints tables in Markdown.
 """
 
@@ -22,6 +23,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import sheetbend as sb
@@ -41,7 +43,7 @@ class Row:
     h: float
     forward: float
     error: float
-    with_gradient: float
+    with_gradient: float | None  # None and empty where it was not asked for
     gradient: dict[str, float]
     differences: dict[str, float]
 
@@ -78,48 +80,59 @@ def timed(work: Callable[[], object]) -> float:
     return min(seconds)
 
 
-def ours(s: Springs, substeps: Sequence[float]) -> Iterator[Row]:
+def ours(s: Springs, substeps: Sequence[float], forward: bool = False) -> Iterator[Row]:
     finest = ends(s, min(substeps) / FINER)
     for h in substeps:
+        error, seconds = distance(ends(s, h), finest), timed(partial(ends, s, h))
+        if forward:
+            yield Row("sheetbend", h, seconds, error, None, {}, {})
+            continue
         by_difference = {
             name: float((s.seed * (ends(changed(s, name, d), h) - ends(changed(s, name, -d), h))).sum() / (2 * d))
             for name, d in STEPS.items()
         }
-        forward, both = timed(partial(ends, s, h)), timed(partial(gradient, s, h))
-        yield Row("sheetbend", h, forward, distance(ends(s, h), finest), both, gradient(s, h), by_difference)
+        both = timed(partial(gradient, s, h))
+        yield Row("sheetbend", h, seconds, error, both, gradient(s, h), by_difference)
 
 
-def newtons(s: Springs, substeps: Sequence[float], folder: Path) -> Iterator[Row]:
-    finest = loop(s, min(substeps) / FINER)
+def newtons(s: Springs, kind: str, substeps: Sequence[float], folder: Path, forward: bool) -> Iterator[Row]:
     env = {**os.environ, "WARP_CACHE": str(folder / "warp-cache")}
     python, script = folder / "newton" / "bin" / "python", HERE / "peers" / "with_newton.py"
     with tempfile.TemporaryDirectory() as scratch:
         problem = Path(scratch) / "problem.npz"
         s.export(problem)
-        for h in substeps:
-            command = [str(python), str(script), str(problem), str(h)]
+
+        def told(h: float, *more: str) -> dict[str, Any]:
+            command = [str(python), str(script), str(problem), str(h), kind, *more]
             done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=LIMIT)
             if done.returncode != 0:
                 sys.exit(f"error: with_newton.py failed at a substep of {h:g} s:\n{done.stderr.strip()[-2000:]}")
-            told = json.loads(done.stdout.splitlines()[-1])
-            error = distance(np.array(told["end"]), finest)
+            result: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+            return result
+
+        last = min(substeps) / FINER
+        finest = loop(s, last) if kind == "semi_implicit" else np.array(told(last, "forward")["end"])
+        for h in substeps:
+            t = told(h, *(["forward"] if forward else []))
             yield Row(
-                f"newton {told['version']}",
+                f"newton {t['version']} {kind}",
                 h,
-                told["forward_s"],
-                error,
-                told["gradient_s"],
-                told["gradient"],
-                told["differences"],
+                t["forward_s"],
+                distance(np.array(t["end"]), finest),
+                t.get("gradient_s"),
+                t.get("gradient", {}),
+                t.get("differences", {}),
             )
-    print(f"\nBoth programs at their shortest substeps over {FINER} end ", end="")
-    print(f"{1e3 * distance(finest, ends(s, min(SUBSTEPS[s.sphere > 0][0]) / FINER)):.2g} mm apart.")
+    if kind == "semi_implicit":
+        apart = distance(finest, ends(s, min(SUBSTEPS[s.sphere > 0]["sheetbend"]) / FINER))
+        print(f"\nBoth programs at their shortest substeps over {FINER} end {1e3 * apart:.2g} mm apart.")
 
 
-# By whether there is a sphere: ours, newton's [s].
+# By whether there is a sphere [s].
+PEERS = ("semi_implicit", "xpbd", "vbd")
 SUBSTEPS = {
-    False: ((1e-2, 2.5e-3, 5e-4, 1e-4), (1.5e-4, 1e-4, 5e-5)),
-    True: ((1e-3, 5e-4, 2.5e-4), (1.5e-4, 1e-4, 5e-5)),
+    False: {"sheetbend": (1e-2, 2.5e-3, 5e-4, 1e-4), **dict.fromkeys(PEERS, (1.5e-4, 1e-4, 5e-5))},
+    True: {"sheetbend": (1e-3, 5e-4, 2.5e-4), **dict.fromkeys(PEERS, (1.5e-4, 1e-4, 5e-5))},
 }
 
 
@@ -131,21 +144,24 @@ def tables(rows: Sequence[Row]) -> Iterator[str]:
     yield "| | substep, ms | error at the end, mm | forward, s | forward and gradient, s |"
     yield "| --- | --- | --- | --- | --- |"
     for r in rows:
-        yield f"| {r.program} | {1e3 * r.h:g} | {1e3 * r.error:.2g} | {r.forward:.3g} | {r.with_gradient:.3g} |"
-    yield ""
-    yield "| derivative with respect to | " + " | ".join(f"{r.program}, {1e3 * r.h:g} ms" for r in rows) + " |"
-    yield "| --- |" + " --- |" * len(rows)
-    for name in STEPS:
-        pairs = (f"{r.gradient[name]:.6g} ({r.differences[name]:.6g})" for r in rows)
-        yield f"| {name} | " + " | ".join(pairs) + " |"
-    theirs = min((r for r in rows if r.program != "sheetbend"), key=lambda r: r.error)
-    good = [r for r in rows if r.program == "sheetbend" and r.error <= theirs.error]
-    yield ""
-    if good:
-        best = min(good, key=lambda r: r.forward)
-        yield f"At newton's smallest error ours takes {best.forward / theirs.forward:.2g} of its forward time."
-    else:
-        yield "No substep of ours reaches newton's smallest error."
+        both = "" if r.with_gradient is None else f"{r.with_gradient:.3g}"
+        yield f"| {r.program} | {1e3 * r.h:g} | {1e3 * r.error:.2g} | {r.forward:.3g} | {both} |"
+    if derived := [r for r in rows if r.gradient]:
+        yield ""
+        yield "| derivative with respect to | " + " | ".join(f"{r.program}, {1e3 * r.h:g} ms" for r in derived) + " |"
+        yield "| --- |" + " --- |" * len(derived)
+        for name in STEPS:
+            pairs = (f"{r.gradient[name]:.6g} ({r.differences[name]:.6g})" for r in derived)
+            yield f"| {name} | " + " | ".join(pairs) + " |"
+    for peer in dict.fromkeys(r.program for r in rows if r.program != "sheetbend"):
+        theirs = min((r for r in rows if r.program == peer), key=lambda r: r.error)
+        good = [r for r in rows if r.program == "sheetbend" and r.error <= theirs.error]
+        yield ""
+        if good:
+            best = min(good, key=lambda r: r.forward)
+            yield f"At the smallest error of {peer} ours takes {best.forward / theirs.forward:.2g} of its forward time."
+        else:
+            yield f"No substep of ours reaches the smallest error of {peer}."
 
 
 def main() -> None:
@@ -153,11 +169,15 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--scenes", nargs="+", choices=["rope", "cloth"], default=["rope", "cloth"])
     parser.add_argument("--columns", type=int, default=32, help="particles along a side of the cloth")
+    parser.add_argument("--peers", nargs="+", choices=PEERS, default=["semi_implicit"], help="solvers of newton")
+    parser.add_argument("--forward", action="store_true", help="no gradients")
     given = parser.parse_args()
     for name in given.scenes:
         s = rope_on_plane() if name == "rope" else cloth_on_sphere(given.columns)
-        mine, theirs = SUBSTEPS[s.sphere > 0]
-        rows = [*ours(s, mine), *newtons(s, theirs, given.folder.resolve())]
+        substeps = SUBSTEPS[s.sphere > 0]
+        rows = [*ours(s, substeps["sheetbend"], given.forward)]
+        for peer in given.peers:
+            rows += newtons(s, peer, substeps[peer], given.folder.resolve(), given.forward)
         print(f"\n{name}, {len(s.start)} particles, {s.seconds:g} s\n")
         print("\n".join(tables(rows)), flush=True)
 

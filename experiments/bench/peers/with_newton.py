@@ -1,7 +1,8 @@
-"""newton.solvers.SolverSemiImplicit on springs that touch a plane or a sphere, in single precision; gradients by
-warp.Tape, beside central differences of the same program.
+"""A solver of newton on springs that touch a plane or a sphere, in single precision; of "semi_implicit" also gradients,
+by warp.Tape, beside central differences of the same program.
 
-Run as: PYTHON with_newton.py PROBLEM.npz H, where contact_beside.py tells what the problem holds. One line of JSON.
+Run as: PYTHON with_newton.py PROBLEM.npz H SOLVER [forward], where contact_beside.py tells what the problem holds, and
+SOLVER is "semi_implicit", or "xpbd" or "vbd" with ten iterations. One line of JSON.
 """
 
 from __future__ import annotations
@@ -22,10 +23,23 @@ wp.set_device("cpu")
 import newton  # noqa: E402
 
 p = np.load(sys.argv[1])
-h = float(sys.argv[2])
+h, kind = float(sys.argv[2]), sys.argv[3]
 steps = round(float(p["seconds"]) / h)
 mass, sphere, stiffness = float(p["mass"]), float(p["sphere"]), float(p["contact_stiffness"])
 STEPS = {"friction": 1e-2, "stiffness": 1e-2, "start": 1e-4, "velocity": 1e-3}  # of the differences
+
+
+def colors() -> list[list[int]]:
+    """Groups of particles that no spring joins, which VBD moves at once: the builder's coloring knows no springs."""
+    joined: dict[int, set[int]] = {}
+    for i, j in p["links"]:
+        joined.setdefault(int(i), set()).add(int(j))
+        joined.setdefault(int(j), set()).add(int(i))
+    color: dict[int, int] = {}
+    for i in range(len(p["start"])):
+        taken = {color[j] for j in joined[i] if j in color}
+        color[i] = next(c for c in range(len(taken) + 1) if c not in taken)
+    return [[i for i, c in color.items() if c == k] for k in range(max(color.values()) + 1)]
 
 
 @wp.kernel
@@ -53,12 +67,19 @@ class Run:
             builder.add_shape_sphere(body=-1, radius=sphere, cfg=material)
         else:
             builder.add_ground_plane(cfg=material)
+        if kind == "vbd":
+            builder.set_coloring(colors())
         self.model = builder.finalize(requires_grad=gradient)
         self.model.spring_rest_length.assign(p["rest"].astype(np.float32))
         for name, value in law.items():
             setattr(self.model, f"soft_contact_{name}", value)
         self.model.particle_grid = None
-        self.solver = newton.solvers.SolverSemiImplicit(self.model, enable_tri_contact=False)
+        if kind == "semi_implicit":
+            self.solver = newton.solvers.SolverSemiImplicit(self.model, enable_tri_contact=False)
+        else:
+            self.solver = {"xpbd": newton.solvers.SolverXPBD, "vbd": newton.solvers.SolverVBD}[kind](
+                self.model, iterations=10
+            )
         self.pipeline = newton.CollisionPipeline(
             self.model, broad_phase="explicit", soft_contact_gap=10.0 if sphere == 0.0 else 0.01, requires_grad=gradient
         )
@@ -122,6 +143,7 @@ def difference(name: str, step: float) -> float:
 told = {"version": newton.__version__, "h": h, "steps": steps}
 told["forward_s"], end = timed(Run(False).forward)
 told["end"] = end.tolist()
-told["gradient_s"], told["gradient"] = timed(Run(True).gradient)
-told["differences"] = {name: difference(name, step) for name, step in STEPS.items()}
+if kind == "semi_implicit" and "forward" not in sys.argv:
+    told["gradient_s"], told["gradient"] = timed(Run(True).gradient)
+    told["differences"] = {name: difference(name, step) for name, step in STEPS.items()}
 print(json.dumps(told), flush=True)
