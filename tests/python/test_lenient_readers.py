@@ -210,3 +210,10 @@ def test_files_that_are_not_read_say_how_to_convert_them(tmp_path: Path, name: s
     (tmp_path / name).write_bytes(b"x")
     with pytest.raises(RecordingError, match=rf"suffix that no reader knows.*{words}"):
         Recording.load(tmp_path / name)
+
+
+def test_a_cell_of_many_digits_is_refused_at_once(tmp_path: Path) -> None:
+    """The search for decimal commas took the square of its length: 22 s for 65,000 digits, found by fuzz.py."""
+    (tmp_path / "take.csv").write_text("%time\ta.x\ta.y\ta.z\n1\t1\t2\t3\n" + "1" * 130_000 + "\n")
+    with pytest.raises(RecordingError, match="must have 4 cells"):
+        Recording.load(tmp_path / "take.csv")

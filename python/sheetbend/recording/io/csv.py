@@ -42,7 +42,7 @@ from .lost import without_zeros
 _DELIMITERS = (",", ";", "\t")
 _AXES = columns.AXES
 _FRAME = re.compile(r"frames?|frame[_ ]?(?:#|no|nr|number|index|id)?|index|", re.IGNORECASE)
-_DECIMAL_COMMA = re.compile(r"([+-]?\d*),(\d+(?:[eE][+-]?\d+)?)")
+_DECIMAL_COMMA = re.compile(r",(?=\d)")
 
 
 def read(path: Path) -> MarkerData:
@@ -99,7 +99,7 @@ def _with_points(rows: list[Row]) -> list[Row]:
     header, *below = rows
     if any("." in cell for _, cells in below for cell in cells):
         return rows
-    return [header, *((line, [_DECIMAL_COMMA.sub(r"\1.\2", cell) for cell in cells]) for line, cells in below)]
+    return [header, *((line, [_DECIMAL_COMMA.sub(".", cell) for cell in cells]) for line, cells in below)]
 
 
 def _before_time(header: list[str]) -> bool:
