@@ -354,7 +354,9 @@ TEST(Contact, HasTheGradientOfComplexStepsWhereNewtonIterates) {
         along += direction * found[i];
         size += std::abs(direction * found[i]);
       }
-      if (size > 0.0) EXPECT_NEAR(loss(p, probe).im / complex_step, along, 1e-8 * size) << quantity_names[q];
+      if (size > 0.0) {
+        EXPECT_NEAR(loss(p, probe).im / complex_step, along, 1e-8 * size) << quantity_names[q];
+      }
     }
     if (integrator == Integrator::bdf2) expect_bits_of_any_tape(p, s.inputs);
   }
