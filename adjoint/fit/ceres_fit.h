@@ -14,7 +14,7 @@ struct CeresOptions {
   double function_tolerance = 1e-12, gradient_tolerance = 1e-12, parameter_tolerance = 1e-12;
   std::vector<double> longest_step;  // of each parameter; infinite where there is none
   std::vector<int> held;             // parameters that stay, in order; not all of them
-  double residual_seconds = 0.0;     // that residuals alone took the caller, where it knows
+  double residual_seconds = 0.0;     // [s] that the caller took for residuals alone; 0: unknown
 };
 
 struct CeresProgress {

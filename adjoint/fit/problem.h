@@ -45,8 +45,8 @@ class Problem {
   std::vector<double> respond(int experiment, const double* u, const double* changes, int count,
                               Interrupt* interrupt) const;
 
-  // What corrections leave of a change of the data's residuals that fixed corrections make, to first order and by their last linearization: (rows),
-  // with what it changes in their own rows.
+  // (rows) How all residuals change, to first order, once corrections have followed a change (data_rows) of the data's residuals at fixed corrections; with
+  // their last linearization, after an evaluation.
   std::vector<double> reduced(const double* change) const;
 
   // The correction [m] of an experiment in the last evaluation, or as given where none is estimated.

@@ -53,8 +53,8 @@ class Projection {
   void follow(Projection& other);
 
   // Everything besides u that later results depend on, appended to numbers; and a projection that goes on from there to the same bits, which
-  // takes what it reads off their front. A is too large to keep: only where it was made is, and it is made again when it is needed. One that was
-  // followed is kept where there is one, so that a projection that followed the same one goes on to the same bits.
+  // takes what it reads off their front. A is too large to save: only the place where it was made is, and it is made again when it is needed. But where
+  // both states followed another projection, the A from there stays: to the same bits if it was the same one.
   void save(std::vector<double>& numbers) const;
   void restore(const double*& numbers);
 

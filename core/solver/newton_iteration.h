@@ -11,7 +11,7 @@ namespace sheetbend {
 
 class NewtonIteration {
  public:
-  // Of blocks with contacts of single particles, where there is friction that has the Newton matrix factored as LU.
+  // Whether a block has contacts, all of them of single particles, and neither frames nor self-contact. Others are always factored.
   static bool serves(const DirectBlock& block);
   void resize(const Scene& scene, const DirectBlock& block);
   static std::size_t bytes(const DirectBlock& block);
@@ -19,7 +19,7 @@ class NewtonIteration {
   // Takes the particles' own blocks of a matrix: masses, elements (per run, as in NewtonMatrix) and contacts (3, 3).
   void find(const Scene& scene, const DirectBlock& block, const std::vector<double>& masses,
             std::vector<Numbers<double>>& elements, const std::vector<double>& contacts);
-  // Whether about so many iterations as leave this share of a right side are less work than a factor.
+  // Whether solving to this tolerance is expected to be less work than a factor, with a margin of two.
   bool pays(double tolerance) const { return 2.0 * expected(tolerance) <= most_; }
 
   // z = K^-1 z or K^-T z to the tolerance, three numbers per movable particle; multiply(p, q) is q = K p or K^T p. False, with z as it was, where it takes

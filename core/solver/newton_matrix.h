@@ -33,7 +33,7 @@ class NewtonMatrix {
   void find(const Scene& scene, const DirectBlock& block, IncrementalPotential& potential, Numbers<double>& at,
             bool curved = false);
   bool symmetric() const { return symmetric_; }
-  bool rubs() const { return rubs_; }  // whether friction of contacts acts
+  bool rubs() const { return rubs_; }  // whether friction or dissipation of contacts acts
 
   // Factors K so much of the way to the convex matrix, from 0 for K itself to 1. Says whether that is positive definite.
   bool factorize(const Scene& scene, const DirectBlock& block, double convexity);
@@ -60,7 +60,7 @@ class NewtonMatrix {
   }
 
   // z = K^-1 z or K^-T z without a factor, so that no more than this share of z is left, three numbers per movable particle. False, with z as it was,
-  // where friction does not act or a factor is less work.
+  // where nothing rubs or a factor is less work.
   bool iterate(const Scene& scene, const DirectBlock& block, double tolerance, bool transposed, double* z);
 
   // Kz = K z on rows of four; of fixed particles what the constraints alone make of it.

@@ -113,7 +113,7 @@ void let_slide(const Scene& scene, const Inputs<const Dual<double, N>>& in, Dual
     const SlidingSpring<K, double> values([&](int d) { return at(d).v; }, own);
     if (!values.slides) return;
 
-    // The yield says when C slides, and is not in it. Of many directions few change what is.
+    // The yield decides when C slides and is no part of it. Most directions change none of the parameters that are.
     bool varies = false;
     for (int k = 0; k < inside; ++k)
       for (int i = 0; i < N; ++i) varies |= k != K::yield_parameter && p[k].d[i] != 0.0;
