@@ -138,8 +138,17 @@ bool ImplicitBlock::step_over_kinks(const Scene& scene, const DirectBlock& block
 
 // Along the Newton step that is in d_. False where nothing lowers what is to fall.
 bool ImplicitBlock::go_down(const Scene& scene, const DirectBlock& block, int most_matrices) {
-  if (rigid().empty())
-    return search_line(block, by_merit_ ? most_halvings_of_merit : most_halvings) || search_where_it_rubs(scene, block);
+  if (rigid().empty()) {
+    const int most = by_merit_ ? most_halvings_of_merit : most_halvings;
+    if (search_line(block, most)) return true;
+    if (!factored_) {  // what iterations left of R may be that of a heavy particle, which the merit feels less
+      look(block);
+      factorize_newton(scene, block);
+      take_direction(scene, block);
+      if (search_line(block, most)) return true;
+    }
+    return search_where_it_rubs(scene, block);
+  }
   if (search_line(block, 1)) return true;
   if (step_over_kinks(scene, block, most_matrices)) return true;
   const double before = merit_;

@@ -1,6 +1,7 @@
-// Conjugate gradients: they solve, in lanes as alone; they end where there is nothing to do or nothing to hope for.
+// Conjugate gradients: they solve, in lanes as alone; they end where there is nothing to do or nothing to hope for. And BiCGSTAB.
 #include "core/linear/conjugate_gradients.h"
 
+#include "core/linear/bicgstab.h"
 #include "core/scalar/dual.h"
 #include "tests/cpp/support/programs.h"
 
@@ -119,6 +120,43 @@ TEST(NewtonByConjugateGradients, EndsWithItsIterations) {
   for (const SolverOptions& bad : {SolverOptions{.cg_tolerance = 0.0}, SolverOptions{.cg_tolerance = 1.0},
                                    SolverOptions{.cg_tolerance = std::nan("")}, SolverOptions{.cg_iterations = 0}})
     EXPECT_THROW(make_plan(sample.scene, bad), std::invalid_argument);
+}
+
+// A chain of springs that pull one end more than the other, as friction does, in rows of four numbers of which the last stays zero.
+struct OneSided {
+  double skew;
+
+  void multiply(const Numbers<double>& p, Numbers<double>& q) const {
+    for (int i = 0; i < 4 * particles; ++i) {
+      q[i] = i % 4 == 3 ? 0.0 : 4.0 * p[i];
+      if (i >= 4) q[i] -= (1.0 + skew) * p[i - 4];
+      if (i + 4 < 4 * particles) q[i] -= (1.0 - skew) * p[i + 4];
+    }
+  }
+  void precondition(const double* r, double* y) const {
+    for (int i = 0; i < 4 * particles; ++i) y[i] = 0.25 * r[i];
+  }
+};
+
+TEST(Bicgstab, SolvesWithAMatrixThatIsNotSymmetric) {
+  for (const double skew : {0.0, 0.5, 2.0}) {
+    Bicgstab krylov;
+    krylov.resize(particles, 2);
+    Numbers<double> wanted, made;
+    wanted.assign(4 * (particles + 2));
+    made.assign(4 * (particles + 2));
+    Random random(94);
+    for (int i = 0; i < 4 * particles; ++i) wanted[i] = i % 4 == 3 ? 0.0 : random(-1.0, 1.0);
+    const OneSided matrix{skew};
+    matrix.multiply(wanted, made);
+    std::copy_n(made.data(), 4 * particles, krylov.b.data());
+    ASSERT_TRUE(krylov.solve(matrix, 1e-13, 200)) << skew;
+    for (int i = 0; i < 4 * (particles + 2); ++i) EXPECT_NEAR(krylov.x[i], wanted[i], 1e-11) << skew;
+    std::copy_n(made.data(), 4 * particles, krylov.b.data());
+    EXPECT_FALSE(krylov.solve(matrix, 1e-13, 2)) << "two iterations do not do";
+    std::fill_n(krylov.b.data(), 4 * particles, 0.0);
+    EXPECT_TRUE(krylov.solve(matrix, 1e-13, 0)) << "zero is its own answer";
+  }
 }
 
 }  // namespace
