@@ -115,7 +115,8 @@ class Climb:
         given, split = search.given, search.split
         by = lateness(rope.model, split.fitted, rope.values, search.threads)
         if by is None or abs(by) < (LEFT if self.late else LEAST):
-            return self._skip(rung, verdict(rope.errors, rope.errors), began)
+            why = "no delay is found" if by is None else f"a delay of {1e3 * by:.2g} ms is too small to be told"
+            return self._skip(rung, verdict(rope.errors, rope.errors), began, why)
         found: Rope | None = None
         told: Verdict | None = None
         try:
@@ -224,13 +225,18 @@ class Climb:
         self.rope = before
         self.search.given, self.search.split, self.beside, self.search.left_out = kept
 
-    def _skip(self, rung: Rung, told: Verdict, began: float) -> bool:
-        """Note a rung that promises nothing; it does not stay."""
+    def _skip(self, rung: Rung, told: Verdict, began: float, why: str | None = None) -> bool:
+        """Note a rung that promises nothing; it does not stay.
+
+        Args:
+            why: in words; None = by what one step promises.
+        """
         assert self.rope is not None
         fitted, others = self.rope.errors.typical
         seconds = time.perf_counter() - began
         self.steps.append(Step(rung.name, fitted, others, False, seconds, told.ratio, told.better, told.count))
-        self.search.say(f"{rung.name}: one step promises {told.ratio:.3g} times the errors without it, does not stay")
+        why = why or f"one step promises {told.ratio:.3g} times the errors without it"
+        self.search.say(f"{rung.name}: {why}, does not stay")
         return False
 
     def _with(self, rung: Rung, rope: Rope) -> tuple[RopeModel, Parts]:
