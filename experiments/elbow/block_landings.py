@@ -115,8 +115,8 @@ def scene_of(toss: Toss, height: float = 0.0) -> sb.Scene:
         axis=frame @ AXIS,
         rate=start.rate,
         viscosity=1e-4,
-        tilt_stiffness=85.0,
-        tilt_damping=0.06,
+        tilt_stiffness=FOUND["hinge_tilt_stiffness"],
+        tilt_damping=FOUND["hinge_tilt_damping"],
     )
     table = sb.Plane(name="table", point=(0.0, 0.0, height))
     for body in (first, second):

@@ -103,7 +103,7 @@ def test_fits_in_one_table_with_petabs_columns() -> None:
     assert "bad (doubtful)" in found.report()
     assert "not told" not in found.report()
     alike = Collected.of({name: result(estimate(1e-3)) for name in "abcdefgh"}).report()
-    assert "not told" in alike and "rope_EI differ by less than their intervals alone would make them" in alike
+    assert "not told: rope_EI: specimens differ by less than their intervals alone would make them" in alike
     few = Collected.of({"a": fits["a"], "b": fits["b"]})
     assert few.traits[0].found is None and "rope_EI" in few.report()
 

@@ -7,9 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from sheetbend.gripped import GrippedMotion, RopeReport, fit_rope
+from sheetbend.gripped.climb import Climb
 from sheetbend.gripped.clock import lateness
 from sheetbend.gripped.judging import predict
 from sheetbend.gripped.ladder import CLOCK, TWIST
+from sheetbend.gripped.search import Search
+from sheetbend.gripped.steps import Rope
 from sheetbend.report.scores import coordinate_error
 from test_gripped_motion import carried_about, model_of
 
@@ -62,3 +65,18 @@ def test_a_fit_predicts_with_earlier_grips_and_says_so(unseen: GrippedMotion) ->
     assert less < 0.5 * error
     assert any("ms after the others" in words for words in found.warnings)
     assert RopeReport("arch", found).to_dict()["grips_late"] == found.model.late
+
+
+def test_ctrl_c_in_the_fit_leaves_the_grips_as_they_were(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The motions were moved before the fit, and the last fit went on with them as if nothing was late."""
+
+    def stopped(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    climb = Climb(Search([MOTION], 0.0, ((0.5, 1.0),), 1, list[str]().append))
+    climb.rope, split = Rope(MODEL, (), {}), climb.search.split
+    monkeypatch.setattr("sheetbend.gripped.climb.lateness", lambda *_: LATE)
+    monkeypatch.setattr(Climb, "_long", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        climb._climbed(CLOCK)
+    assert climb.search.split is split and climb.late == 0.0 and climb.search.whole == [MOTION]

@@ -70,10 +70,12 @@ class TestSchemas:
 
 def test_parameters_are_a_table(result: sb.FitResult) -> None:
     (e,) = result.estimates
-    open_ended = replace(e, name="=cmd", upper=None, words='of, "many" words')
+    e = replace(e, in_all=2.5)
+    open_ended = replace(e, name="=cmd", upper=None, in_all=None, words='of, "many" words')
     table = parameter_table(replace(result, estimates=(e, open_ended)))
     first, second = csv.DictReader(io.StringIO(table))
     assert float(first["value"]) == e.value and float(first["lower"]) == e.lower and first["unit"] == e.unit
+    assert float(first["in_all"]) == 2.5 and second["in_all"] == "" and first["verdict"] == e.verdict
     assert second["parameter"] == "'=cmd" and second["upper"] == "" and second["words"] == open_ended.words
 
 

@@ -72,7 +72,7 @@ CASES: dict[str, tuple[Any, str]] = {
     "scale": (lambda: moved((0.0, 0.0, 0.0), 1.01), "the recording were 0.99 % too large"),
     "late": (lambda: timed(late=0.0025), "the motion had begun 2.5 ms earlier"),
     "lost": (lambda: timed(late=0.02, first=60), "fall had lost 2 of its frames before 0.6 s"),
-    "twice": (lambda: timed(late=-0.01, first=40), "fall had twice 1 of its frames before 0.4 s"),
+    "twice": (lambda: timed(late=-0.01, first=40), "fall had 1 of its frames twice before 0.4 s"),
     "clock": (lambda: timed(1.003), "the times of the recording were 0.3 % too long"),
     "places": (lambda: placed(-0.003), "all markers sat 3 mm farther along the material"),
     "beside": (lambda: beside(0.003), "stood 3 mm off the axis of the rope, at right angles to it and to"),

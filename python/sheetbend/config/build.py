@@ -74,12 +74,12 @@ class Study:
 
     @property
     def _refinement(self) -> Refinement:
-        """Whatever has a mesh can be made finer, but for a cloth whose stiffness varies: the modes are those of its
-        triangles."""
+        """Whatever has a mesh can be made finer, except a scene with a cloth whose stiffness varies: on other triangles
+        the modes would have other shapes."""
         fit, scene = self.config.fit, self.config.scene
         varied = any(cloth.stiffness_modes for cloth in scene.cloth)
         if varied and fit.double_segments:
-            fix = "leave it out: the mesh then does not count, and the report says so"
+            fix = "leave it out; the intervals then contain no error of the mesh, which the report points out"
             raise ConfigError("fit.double_segments", "does not go with stiffness_modes of a cloth", True, fix)
         meshed = fit.double_segments is not False and bool(scene.strands or scene.cloth) and not varied
         finer = (lambda: build(self.config, self.folder, finer=2).experiments) if meshed else None

@@ -79,8 +79,8 @@ def between_parts(
 
     Args:
         refinement: of the discretization; where parts differ, one simulation each tells what it explains of that.
-            Parts must differ with and without it. Where it widens an interval more than noise does, they mostly do
-            without, and it is asked first.
+            Parts must differ both with and without it. Where the refinement widens an interval more than noise does,
+            parts mostly differ only without it, so the simulations come first.
     """
     coarse = refinement is not None and any(e.discretization > (e.statistical or 0.0) for e in judged.estimates)
     words = {} if coarse else _between(problem, u, judged, [])

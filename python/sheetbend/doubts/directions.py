@@ -63,9 +63,12 @@ def clearly(
     problem: FitProblem, u: Array, column: Array, mine: Array, tests: int, shifts: Callable[[], list[Array]]
 ) -> Asked | None:
     """`asked_for` at a minimum u (free,), if it explains a third of what some rows leave and chance does not, of so
-    many tests. What noise of what drives the scenes does to the residuals counts as chance, and what a finer mesh
-    changes of those of the data, which `shifts` tells, is taken out: on a coarse mesh right models asked for a
-    damping."""
+    many tests. What noise of what drives the scenes does to the residuals counts as chance.
+
+    Args:
+        shifts: makes what a finer mesh changes of the residuals of the data, (data rows,) each. This is taken out: on a
+            coarse mesh, right models asked for a damping.
+    """
     _, r, J = problem.evaluate(u)
     layout, taken = problem.rows_layout(), sum(map(problem.core.absorbed, range(len(problem.experiments))))
     column = np.where(mine, column, 0.0)

@@ -37,7 +37,7 @@ def lost_frames(problem: FitProblem, q: Array, r: Array, told: Sequence[Told]) -
         if one.label == LATER:
             i = one.experiment
             rows = np.arange(first[i], first[i + 1])[one.rows]
-            frame = layout.frame[rows] - layout.frame[rows].min()
+            frame = layout.frame[rows]
             gap, late = _likeliest(frame, one.column, q[rows], r[rows])
             times = problem.recordings[i].times
             frames = abs(late) / float(np.median(np.diff(times)))
@@ -72,7 +72,7 @@ def _words(name: str, times: Array, gap: int) -> Callable[[float], str]:
     interval = float(np.median(np.diff(times)))
 
     def says(late: float) -> str:
-        frames = f"{name} had {'lost' if late > 0 else 'twice'} {short(abs(late) / interval, 2)} of its frames"
-        return f"{frames} before {short(float(times[gap]), 3)} s"
+        some = f"{short(abs(late) / interval, 2)} of its frames"
+        return f"{name} had {f'lost {some}' if late > 0 else f'{some} twice'} before {short(float(times[gap]), 3)} s"
 
     return says

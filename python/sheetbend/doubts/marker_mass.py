@@ -12,7 +12,8 @@ SHARE = 0.005  # of what carries them, all together
 
 
 def marker_load(e: Experiment) -> Array:
-    """(nodes,) kg of free nodes for each kg that every marker weighs; of rigid bodies none, whose mass has them."""
+    """(nodes,) kg that free nodes carry for each kg that every marker weighs. Markers on rigid bodies are left out: the
+    mass of a body contains them."""
     weights = np.zeros(e.scene.node_count)
     for place in e.compared_places:
         if place.body is None:
@@ -22,7 +23,7 @@ def marker_load(e: Experiment) -> Array:
 
 
 def unseen_mass(e: Experiment, mass: Array) -> float:
-    """kg that every marker may well weigh without anybody's counting it; 0 where there are no markers on what is free.
+    """kg that each marker may well weigh although the model gives it no mass; 0 where none sits on anything free.
 
     Args:
         mass: (nodes,) of the model.

@@ -47,7 +47,7 @@ GROUPS: Mapping[str, tuple[str, tuple[float, str]]] = {
     "marker_offset": ("m", STEPS["m"]),
     "marker_mass": ("kg", (MOST_EACH, f"{short(1e3 * MOST_EACH)} g each")),
 }
-"""Told numbers that are no quantities, by the name under which a standard deviation is given: unit (none of what is
+"""Told numbers that are no quantities, by the name under which a standard deviation is given: unit ("" where it is
 relative) and step."""
 SIZE, LATER, SLOWER, LARGER = "size of gravity", "frames later", "clock", "size of the recording"
 FARTHER, ASIDE = "path of what drives the scene", "place of what drives the scene"

@@ -146,9 +146,9 @@ def fit(
             "marker_mass" (of each, which the model does not have) in kg, and relative are "gravity_size",
             "recording_clock" (its frame rate), "recording_size" and "drive_size" (how far what drives the scene moves).
             What each of these numbers moves is in `FitResult.premises` in any case.
-        smooth: fields of stiffness (`stiffness_modes` of a solid of clusters) that are fitted with a smoothness prior,
-            by name, such as {"toy_stiffness": sb.Smooth()}. The size and the length of the prior are found from the
-            recordings where `Smooth` does not give them (`FitResult.fields`).
+        smooth: fields of stiffness (`stiffness_modes` of a cloth or a solid of clusters) that are fitted with a
+            smoothness prior, by name, such as {"toy_stiffness": sb.Smooth()}. The size and the length of the prior are
+            found from the recordings where `Smooth` does not give them (`FitResult.fields`).
         leave_one_out: also predict every recording that holds nothing out by a fit to the others.
         profiles: follow the cost to the ends of every interval, all other parameters fitted again; of more than 60
             parameters only for weak ones. Without, intervals are the linear ones, which cost nothing beside the fit.

@@ -1,7 +1,7 @@
-"""The derivative that a fit ended with, carried on to the next rung: only the columns of what the rung adds are new.
+"""The derivatives at the end of a fit, reused by the next rung: only those with respect to what it adds are computed.
 
 Rungs of small offsets begin where the last fit ended, with the same windows. With fifty parameters their first
-derivative would cost as much as that fit's last one, and differ from it by what a short step changes.
+derivatives would cost as much as the last ones of that fit, and differ from them by what a short step changes.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ class Slopes:
     """Derivatives of residuals.
 
     Attributes:
-        windows: which they are of.
+        windows: names of the windows, and how many rows of data they have.
         names: of the free parameters.
-        columns: (data rows, free) by the internal parameters.
+        columns: (data rows, free) with respect to the internal parameters.
     """
 
     windows: Windows
@@ -35,7 +35,7 @@ class Slopes:
 
 
 def slopes_of(problem: FitProblem, J: Array | None) -> Slopes | None:
-    """What a search leaves behind; None where it made no derivative."""
+    """The derivatives that a search ended with; None where it made none."""
     if J is None:
         return None
     return Slopes(_windows(problem), tuple(problem.parameters.free), J[: problem.core.data_rows])
@@ -65,5 +65,5 @@ def carry(problem: FitProblem, slopes: Slopes | None, added: Sequence[Parameter]
 
 
 def _windows(problem: FitProblem) -> Windows:
-    """The same where markers were moved by millimeters."""
+    """Of a problem. They stay the same where markers are moved by millimeters, which changes derivatives little."""
     return tuple(e.name for e in problem.experiments), problem.core.data_rows

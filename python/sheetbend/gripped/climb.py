@@ -115,15 +115,21 @@ class Climb:
         given, split = search.given, search.split
         by = lateness(rope.model, split.fitted, rope.values, search.threads)
         if by is None or abs(by) < (LEFT if self.late else LEAST):
-            return self._skip(rung, verdict(rope.errors, rope.errors), began)
-        self._replace({m: m.later(by) for m in (*search.whole, *split.motions)})
-        found = self._long(rung.name, rope)
-        told = None if found is None else verdict(found.errors, rope.errors)
+            why = "no delay is found" if by is None else f"a delay of {1e3 * by:.2g} ms is too small to be told"
+            return self._skip(rung, verdict(rope.errors, rope.errors), began, why)
+        found: Rope | None = None
+        told: Verdict | None = None
+        try:
+            self._replace({m: m.later(by) for m in (*search.whole, *split.motions)})
+            found = self._long(rung.name, rope)
+            told = None if found is None else verdict(found.errors, rope.errors)
+        finally:  # Ctrl-C in the fit leaves the grips as they were
+            if told is None or not told.stays:
+                search.given, search.split = given, split
         if told is not None and told.stays:
             self.late += by
-            search.say(f"the markers of the grips come {1e3 * self.late:.3g} ms after the others")
-        else:
-            search.given, search.split = given, split
+            when = "after" if self.late > 0 else "before"
+            search.say(f"the markers of the grips come {1e3 * abs(self.late):.3g} ms {when} the others")
         self._keep(rung, found, told, began)
         return self.steps[-1].stays
 
@@ -139,16 +145,20 @@ class Climb:
     def _onto_axis(self, rung: Rung, rope: Rope, began: float) -> bool:
         """Try the recordings, moved onto the rope's axis; whether they stay there. What is fitted next follows them."""
         given, split = self.search.given, self.search.split
-        found, offsets = None, self._offsets(rope)
-        if offsets is not None:
-            self._move(rope, offsets)
-            found = self.search.judged(rope)
-        told = None if found is None else verdict(found.errors, rope.errors)
+        offsets = self._offsets(rope)
+        found: Rope | None = None
+        told: Verdict | None = None
+        try:
+            if offsets is not None:
+                self._move(rope, offsets)
+                found = self.search.judged(rope)
+                told = verdict(found.errors, rope.errors)
+        finally:  # Ctrl-C leaves the markers where they were
+            if told is None or not told.stays:
+                self.search.given, self.search.split = given, split
         if told is not None and told.stays and offsets is not None:
             before = self.beside or ((0.0, 0.0),) * len(offsets)
             self.beside = tuple((a + c, b + d) for (a, b), (c, d) in zip(before, offsets, strict=True))
-        else:
-            self.search.given, self.search.split = given, split
         self._keep(rung, found, told, began)
         return self.steps[-1].stays
 
@@ -196,7 +206,11 @@ class Climb:
         without, name = before, f"without {AND.join(rung.name for rung in again)}"
         for rung in again:
             without = without.without(rung, self.search.split.fitted[0])
-        smaller = self._long(name, without)
+        try:
+            smaller = self._long(name, without)
+        except KeyboardInterrupt:
+            self.search.given, self.search.split, self.beside, self.search.left_out = kept
+            raise
         if smaller is not None:
             gone = {rung.name for rung in again}
             self.steps = [replace(s, stays=s.stays and s.name not in gone) for s in steps]
@@ -211,13 +225,18 @@ class Climb:
         self.rope = before
         self.search.given, self.search.split, self.beside, self.search.left_out = kept
 
-    def _skip(self, rung: Rung, told: Verdict, began: float) -> bool:
-        """Note a rung that promises nothing; it does not stay."""
+    def _skip(self, rung: Rung, told: Verdict, began: float, why: str | None = None) -> bool:
+        """Note a rung that promises nothing; it does not stay.
+
+        Args:
+            why: in words; None = by what one step promises.
+        """
         assert self.rope is not None
         fitted, others = self.rope.errors.typical
         seconds = time.perf_counter() - began
         self.steps.append(Step(rung.name, fitted, others, False, seconds, told.ratio, told.better, told.count))
-        self.search.say(f"{rung.name}: one step promises {told.ratio:.3g} times the errors without it, does not stay")
+        why = why or f"one step promises {told.ratio:.3g} times the errors without it"
+        self.search.say(f"{rung.name}: {why}, does not stay")
         return False
 
     def _with(self, rung: Rung, rope: Rope) -> tuple[RopeModel, Parts]:

@@ -1,4 +1,4 @@
-"""Grips that are recorded later than the other markers, as where a robot tells its poses with a delay."""
+"""Grips that are recorded later than the other markers, such as poses that a robot reports with a delay."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""Frames that a recorder lost without telling: it repeats the frame before in their place, or goes on as if they had
-not been.
+"""Frames that a recorder of a gripped rope lost without a mark: it repeats the frame before in their place, or counts
+on as if there had been none.
 
 A repeated frame is stamped later than what it shows, and is left out. A frame that is missing makes all markers step
 about twice as far from one frame to the next, which no rope does; the times after it are then moved on.
@@ -16,15 +16,15 @@ from ..recording.recording import Recording
 
 Array = NDArray[np.float64]
 
-REPEATS = 5  # frames that repeat in a row: rather frozen tracking, or a file that was made from fewer frames
-MOVES = 2e-3  # m, that a marker goes at least before or after a repeated frame: a rope that rests may repeat
+REPEATS = 5  # frames in a row, from which on it is frozen tracking or a file that was made from fewer frames
+MOVES = 2e-3  # m, that a marker goes at least before or after a repeated frame: of a rope at rest frames may be equal
 BESIDE = 3  # steps before and after, whose medians tell the usual velocity
 FARTHER = 1.6  # a step over the usual one, from which on a frame is missing in it
 FASTER = 1.4  # the same over the one before and over the one after: a rope that starts or stops loses no frame
 ALIKE = 0.8  # of the markers that move, which have to step as far as all together, within `OFF`
 OFF = 0.4  # of a step
-CLEAR = 0.1  # error of the ratio by noise, at most: of slow motion nothing is told, and nothing is lost
-MOST = 0.1  # s, that is missing at most: longer, a motion may have gone anywhere
+CLEAR = 0.1  # error of the ratio by noise, at most: a slow motion does not show a missing frame, nor need it
+MOST = 0.1  # s, that is missing at most: in longer gaps a motion may have gone anywhere
 
 
 def on_time(recording: Recording) -> tuple[Recording, tuple[str, ...]]:

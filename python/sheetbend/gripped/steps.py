@@ -44,7 +44,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Rope:
-    """A model with its fitted values, what is free in it, how it predicts, and where its fit ended the derivative."""
+    """A model with its fitted values, what is free in it, how it predicts, and the derivatives its fit ended with."""
 
     model: RopeModel
     parameters: Parts

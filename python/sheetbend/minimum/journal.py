@@ -211,7 +211,7 @@ class Journal(AbstractContextManager["Journal"]):
             J = _unpacked(_opened(key, packed), len(residuals), free) if jacobian else np.zeros((0, free))
             return (True, residuals, J), None if seconds is None else float(seconds), _opened(key, state)
         except (TypeError, ValueError):  # damaged: it is made again
-            self._known.pop(key)
+            self._known.pop(key, None)  # another thread may have found it too
             return None
 
     def _keep(self, key: bytes, found: Evaluation, jacobian: bool, seconds: float, state: bytes) -> None:

@@ -1,4 +1,5 @@
-"""Steps from frame to frame that no marker on a rope or a cloth takes: it is another one, or a reflection."""
+"""Steps from frame to frame that are too sudden for a marker on a rope or a cloth. What is seen after such a step is
+another marker, or a reflection."""
 
 from __future__ import annotations
 
@@ -11,18 +12,18 @@ from ..arrays.timeseries import Array
 
 Mask = NDArray[np.bool_]
 
-JUMP = 0.05  # of the size of what is recorded, from one frame to the next beyond the usual way
-AWAY = 0.5  # of the larger of two jumps, that their sum is where a marker goes elsewhere and comes back
-SUDDEN = 200.0  # m/s^2, the same for frames that are far apart in time
+JUMP = 0.05  # of the size of what is recorded: what a step from frame to frame must go beyond the usual one
+SUDDEN = 200.0  # m/s^2, the same where frames are far apart in time
+AWAY = 0.5  # of the larger of two jumps: how large their sum is at most where a marker goes elsewhere and comes back
 
 
 def least_leap(times: Array, size: float) -> float:
-    """m, between two frames, that no marker makes on a thing of this size, m."""
+    """m, the shortest leap between two frames that no marker makes on something of this size, m."""
     return max(JUMP * size, SUDDEN * float(np.median(np.diff(times))) ** 2)
 
 
 def leaps(times: Array, track: Array) -> Array:
-    """(frames - 1, 3) by how much each step of a track (frames, 3) goes beyond its usual way."""
+    """(frames - 1, 3) m, each step of a track (frames, 3) beyond what the median velocity about it gives."""
     apart = np.diff(times)[:, None]
     if not len(apart):
         return np.zeros((0, 3))

@@ -246,8 +246,8 @@ class Recording(MarkerData):
         return self._derive(positions=positions)
 
     def mended(self) -> Recording:
-        """Markers that exchange their labels are put back, and those that are elsewhere for some frames not seen there.
-        metadata["mended"] lists what was done; the same object where nothing was wrong."""
+        """Put markers that exchange their labels back, and take those that are elsewhere for some frames as not seen
+        there. metadata["mended"] lists what was done. Returns the same object where nothing was wrong."""
         positions, said = relabeled(self.times, self.positions, self.markers)
         return self._derive(positions=positions, metadata={**self.metadata, "mended": said}) if said else self
 

@@ -1,4 +1,4 @@
-"""Markers that exchange their labels, and markers that are elsewhere for some frames, as tracking confuses them."""
+"""Markers that tracking confuses: they exchange their labels, or are seen elsewhere for some frames."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from ..arrays import timeseries
 from ..arrays.timeseries import Array
 from .leaps import SUDDEN, elsewhere, least_leap
 
-BEFORE = 5  # frames, from which a marker is led on
-FORGOTTEN = 0.1  # s, for which a marker is lost at most and still led on
-CLOSER = 0.25  # of the distance to where it is led: how near others come that exchange their labels
-NOISY = 8.0  # times the noise, by which a marker is off at least that has another's label
-FEWEST = 10  # frames, and markers, that tell it
-MANY = 200  # frames that tell whether points have names
+BEFORE = 5  # frames from which the place of a marker is extrapolated
+FORGOTTEN = 0.1  # s, for which a lost marker is extrapolated at most
+CLOSER = 0.25  # of how far a marker is off its extrapolated place: how far it is at most from that whose label it has
+NOISY = 8.0  # times the noise: how far a marker with another's label is at least off its extrapolated place
+FEWEST = 10  # frames of a recording that is mended, and markers of one whose points may have no names
+MANY = 200  # frames in which points without names are looked for
 ANYWHERE = 0.3  # of the distance to others: how far points without names go from frame to frame at least
 
 
@@ -33,7 +33,7 @@ def shuffled(positions: Array) -> bool:
 
 def relabeled(t: Array, positions: Array, names: Sequence[str]) -> tuple[Array, list[str]]:
     """Positions (frames, markers, 3) m with exchanged labels put back as they were in the first frames, and with NaN
-    where a marker is elsewhere; and a sentence on each."""
+    where a marker is elsewhere; and a sentence on each exchange and each such marker."""
     if len(t) < FEWEST:
         return positions, []
     x, said = _put_back(t, positions, names)
@@ -53,14 +53,14 @@ def relabeled(t: Array, positions: Array, names: Sequence[str]) -> tuple[Array, 
 def _put_back(t: Array, positions: Array, names: Sequence[str]) -> tuple[Array, list[str]]:
     """Positions (frames, markers, 3) m, and a sentence on every frame from which on labels are exchanged.
 
-    Markers are led on from the frames before. Where several are far from where they are led, and each is at the place
-    to which another of them is led, they have exchanged their labels.
+    The places of markers are extrapolated from the frames before. Where several markers are far from theirs, and each
+    is at that of another one of them, they have exchanged their labels.
     """
     x, noise = positions.copy(), timeseries.noise(t, positions)
     floor = NOISY * float(np.nanmedian(noise)) if np.isfinite(noise).any() else 0.0
     said, step = [], float(np.median(np.diff(t)))
     for f in _sudden(t, x, floor):
-        ahead, gap = _led(t, x, f)
+        ahead, gap = _extrapolated(t, x, f)
         off = np.linalg.norm(x[f] - ahead, axis=1)
         gone = np.flatnonzero(off > np.maximum(floor, SUDDEN * step * gap))  # none that is lost
         if len(gone) < 2:
@@ -85,9 +85,9 @@ def _sudden(t: Array, x: Array, floor: float) -> list[int]:
     return [int(f) + 2 for f in np.flatnonzero((seen & ~(turn <= least[:, None])).sum(axis=1) > 1)]
 
 
-def _led(t: Array, x: Array, f: int) -> tuple[Array, Array]:
-    """(markers, 3) m, where the frames before lead markers in frame f, NaN where they are not known; and (markers,) s
-    since they were seen."""
+def _extrapolated(t: Array, x: Array, f: int) -> tuple[Array, Array]:
+    """(markers, 3) m, the places in frame f that are extrapolated from the frames before, NaN where these do not show a
+    marker; and (markers,) s since each was seen."""
     ahead, gap = np.full(x.shape[1:], np.nan), np.full(x.shape[1], np.inf)
     first = max(0, int(np.searchsorted(t, t[f] - FORGOTTEN)) - BEFORE)
     seen = np.isfinite(x[first:f, :, 0])

@@ -86,8 +86,8 @@ class Collected:
             ("spread", "standard deviation between specimens, the errors of their fits taken out; % of logarithms")
         ]
         if alike := [trait.name for trait in self.traits if not trait.shows_spread]:
-            why = "differ by less than their intervals alone would make them. Intervals also contain errors that all"
-            notes.append(("not told", f"{', '.join(alike)} {why} specimens share, such as that of the mesh"))
+            why = "specimens differ by less than their intervals alone would make them. Intervals also contain errors"
+            notes.append(("not told", f"{', '.join(alike)}: {why} that all specimens share, such as that of the mesh"))
         for trait in self.traits:
             if trait.left_out:
                 told = ", ".join(f"{name} ({verdict})" for name, verdict in trait.left_out.items())

@@ -102,7 +102,7 @@ def _estimate(name: str, part: object) -> Estimate:
         raise InputError(f"{where}.interval", "must be [lower, upper]", ends, "give both, null where open")
     rest = {key: value for key, value in told.items() if key != "interval"}
     found = as_dataclass(Estimate, {"name": name, "lower": ends[0], "upper": ends[1], **rest}, where)
-    for part_of in ("half_width", "statistical", "driven", "discretization", "systematic"):
+    for part_of in ("half_width", "statistical", "driven", "discretization", "systematic", "in_all"):
         width = getattr(found, part_of)
         if width is not None and width < 0:
             raise InputError(f"{where}.{part_of}", "must not be negative", width, "give a half-width")

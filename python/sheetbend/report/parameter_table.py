@@ -18,13 +18,15 @@ COLUMNS = (
     "statistical",
     "discretization",
     "systematic",
+    "in_all",
     "verdict",
     "words",
 )
 
 
 def parameter_table(result: FitData) -> str:
-    """CSV text with a row for each estimate: SI units, full digits, an empty cell where an interval is open.
+    """CSV text with a row for each estimate: SI units, full digits, an empty cell where an interval is open or where
+    the half-width with errors of given values (`in_all`) is not known.
 
     Names and words come from files: a cell that a spreadsheet would take for a formula begins with an apostrophe.
     """
@@ -32,7 +34,7 @@ def parameter_table(result: FitData) -> str:
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(COLUMNS)
     for e in result.estimates:
-        numbers = {c: getattr(e, c) for c in COLUMNS[3:9]}
+        numbers = {c: getattr(e, c) for c in COLUMNS[3:10]}
         cells = [_plain(e.name), repr(e.value), _plain(e.unit)]
         cells += ["" if v is None else repr(float(v)) for v in numbers.values()]
         rows.writerow([*cells, e.verdict, _plain(e.words)])

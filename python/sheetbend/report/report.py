@@ -33,7 +33,7 @@ CORRELATIONS_SHOWN = 15
 """Number of correlations that the report lists at most; fit.json has them all."""
 GROWTH_SHOWN = 10.0
 """Growth of small displacements from which on the report tells it."""
-IN_ALL = "+/- in all"  # the half-width with errors of given values
+IN_ALL = "+/- in all"  # heading of the half-width with errors of given values
 FELT = 1.1  # half-widths: where errors of given values make them no wider, the report leaves them out
 _SHAKEN = 0.1  # of a half-width: less adds next to nothing to it
 
@@ -141,7 +141,7 @@ def _parameters(result: FitData) -> Section:
     in_all = {e.name: _in_all(e) for e in result.estimates if e.in_all and e.in_all > FELT * (e.half_width or math.inf)}
     if in_all:
         beside = [(*row, in_all.get(row[0], "")) for row in rows]
-        words = f"if given values, which intervals take as exact, are off by {PLAUSIBLE}, unseen in the residuals"
+        words = f"if given values, which intervals take as exact, are off by up to {PLAUSIBLE}, unseen in the residuals"
         if wide(((*headers, IN_ALL), *beside)):
             shared = [name for name in in_all if not name.endswith("]")] or list(in_all)
             words = f"{', '.join(f'{name} {in_all[name]}' for name in shared)}, {words}"
@@ -157,7 +157,7 @@ def _most(found: Mapping[str, Rests]) -> str:
     for name, on in found.items():
         of.setdefault(on.name, []).append(name)
     most = ", ".join(f"{given} ({', '.join(names)})" for given, names in of.items())
-    return f". The most is {most}" if most else ""
+    return f". What counts most: {most}" if most else ""
 
 
 def _in_all(estimate: Estimate) -> str:

@@ -1,4 +1,4 @@
-"""What given numbers that are wrong by as much as they may well be would do to an estimate without a trace.
+"""How far given numbers, wrong by as much as they may well be, would move an estimate without a trace.
 
 An error that leaves much in the residuals is named (doubts.wrong_given). So an error counts here up to the size from
 which on it would be. Intervals take given numbers as exact. So the report shows a second half-width, in which these

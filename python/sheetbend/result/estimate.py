@@ -36,8 +36,8 @@ class Estimate:
         words: the verdict as a sentence.
         moved: how far the value was moved to the limit of short substeps and fine meshes, in `unit`; it is contained in
             `value`.
-        in_all: half-width if given numbers are off, too, by what they may well be and residuals do not show; None where
-            that was not measured, or where no verdict stands.
+        in_all: half-width that also contains errors of given numbers, as large as they may well be without showing in
+            the residuals; None where these were not looked at, or where the verdict is neither "identified" nor "weak".
     """
 
     name: str
