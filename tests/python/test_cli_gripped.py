@@ -147,7 +147,7 @@ class TestFit:
         for words in ("time step", "finer mesh", "systematic", "not counted"):
             assert words in report, report
         assert "rope_GJ" in report and "error/blend" in report and TILTS.name in report
-        assert max(len(line) for line in report.splitlines()) <= 100
+        assert max(len(line) for line in report.splitlines()) <= 100, report
 
     def test_recordings_are_smoothed_once(self, config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         edited(config, ('["twist", "tilts"]', '["twist"]'), ("[[0.5, 1.5], [1.0, 4.0]]", "[[0.5, 0.5]]"))

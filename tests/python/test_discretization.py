@@ -268,6 +268,9 @@ class Bent:
         self.experiments, self.core, self.jacobians = (), SimpleNamespace(data_rows=3, rows=3), 0
         self.estimates_corrections = False
 
+    def follow(self, other: Bent) -> Bent:
+        return self
+
     def evaluate(self, u: np.ndarray, jacobian: bool = True) -> tuple[bool, np.ndarray, np.ndarray]:
         self.jacobians += jacobian
         r = np.array([u[0] - self.shift, u[1], 10.0 + 0.075 * u[1] ** 2])

@@ -88,39 +88,11 @@ def test_axes_of_the_tosses_are_those_of_the_table() -> None:
 def test_table_is_as_high_as_the_lowest_corner_rests() -> None:
     from block_landings import CORNERS, FOUND, halves, of_both, predicted
 
-    toss = next(toss for toss in halves()[1] if toss.free >= 13 and toss.recorded_up[2] < 1.0)
+    # One that ends where it did before the table was moved to its height.
+    toss = next(toss for toss in halves()[1] if toss.free >= 17 and toss.recorded_up[2] < 1.0)
     rest = predicted(toss, of_both(FOUND))
     low = min(float(((x[-1] + CORNERS @ axes[-1].T) @ toss.recorded_up).min()) for x, axes in rest)
     assert abs(low) < 5e-4
-
-
-def test_impulse_on_a_corner_is_found_from_the_velocities_after_it() -> None:
-    """The balance of momentum of both blocks, against a push on a free body and against its own reverse."""
-    from block_impacts import Impact, at_corner, explained, mass_matrix, motions
-    from block_landings import CORNERS, FOUND
-    from blocks import MASS
-    from sheetbend.arrays.rotations import rotation_matrix
-
-    first = rotation_matrix("first", np.array([0.3, -0.7, 0.4]))
-    frames = np.stack([first, first @ rotation_matrix("hinge", np.array([0.0, 0.9, 0.0]))])
-    before = np.array([0.3, -0.2, -1.8, 1.0, 2.0, -3.0, 4.0])
-    corner, push = frames[1] @ CORNERS[5], np.array([-0.2, 0.1, 1.1])
-    resting = Impact("made", frames, 1, corner, before, before)
-    change = np.linalg.solve(mass_matrix(frames), at_corner(resting).T @ push)
-    found, left = explained(Impact("made", frames, 1, corner, before, before + change))
-    assert found == pytest.approx(push, abs=1e-12)
-    assert left < 1e-12
-    # Momentum: both centers take the push between them, and the moments about the first center agree.
-    one, spin, two, other_spin = (motions(frames) @ change).reshape(4, 3)
-    assert MASS * (one + two) == pytest.approx(push, abs=1e-12)
-    moments = np.diag([FOUND[f"first_inertia_{k}"] for k in (1, 2, 3)])
-    turning = sum(f @ moments @ f.T @ w for f, w in zip(frames, (spin, other_spin), strict=True))
-    center = frames[0] @ [-0.035, 0.06, 0.0] + frames[1] @ [0.035, 0.0, 0.0]
-    assert turning + np.cross(center, MASS * two) == pytest.approx(np.cross(center + corner, push), abs=1e-12)
-    axis = frames[0] @ [0.0, 1.0, 0.0]
-    arm = frames[1] @ [0.035, 0.0, 0.0]
-    about = frames[1] @ moments @ frames[1].T @ other_spin + np.cross(arm, MASS * two)
-    assert axis @ about == pytest.approx(axis @ np.cross(arm + corner, push), abs=1e-12)
 
 
 def test_flights_between_impacts_are_free() -> None:

@@ -18,7 +18,7 @@ def chain() -> StiffnessField:
     """Five clusters in a row with two modes."""
     centers = np.column_stack([0.01 * np.arange(N), np.zeros((N, 2))])
     values, shapes = modes_of(centers, np.column_stack([np.arange(N - 1), np.arange(1, N)]))
-    return StiffnessField("E", ("E_1", "E_2"), values, shapes[:, 1:3], centers)
+    return StiffnessField("E", ("E_1", "E_2"), values, shapes[:, 1:3], centers, np.zeros((N, N - 3)))
 
 
 def linear(wanted: Smooth, informative: float = 1.0) -> tuple[Picture, Field, np.ndarray, np.ndarray]:

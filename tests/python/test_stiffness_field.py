@@ -67,7 +67,7 @@ def test_the_prior_is_a_field_of_the_given_size_and_length() -> None:
     centers = np.column_stack([d * np.arange(n), np.zeros(n), np.zeros(n)])
     values, shapes = modes_of(centers, np.column_stack([np.arange(n - 1), np.arange(1, n)]))
     modes = tuple(f"m_{k}" for k in range(1, n))
-    field = StiffnessField("E", modes, values, shapes[:, 1:], centers)
+    field = StiffnessField("E", modes, values, shapes[:, 1:], centers, np.zeros((len(centers), 0)))
     sd = field.deviations(size, length)
     covariance = (field.shapes * sd**2) @ field.shapes.T
     assert np.mean(np.diag(covariance)) == pytest.approx(size**2)

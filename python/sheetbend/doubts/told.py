@@ -50,7 +50,7 @@ GROUPS: Mapping[str, tuple[str, tuple[float, str]]] = {
 """Told numbers that are no quantities, by the name under which a standard deviation is given: unit ("" where it is
 relative) and step."""
 SIZE, LATER, SLOWER, LARGER = "size of gravity", "frames later", "clock", "size of the recording"
-FARTHER, ASIDE = "path of what drives the scene", "place of what drives the scene"
+FARTHER, ASIDE = "path of the drive", "place of the drive"
 WEIGHTS, BESIDE = "mass of each marker", "offset of markers"
 _NONE = np.zeros(0)
 

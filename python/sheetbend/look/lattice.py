@@ -20,10 +20,11 @@ EVEN = 0.05  # of a gap: how much the distances across it vary, in the median
 NEAREST = 0.8  # of the markers are the nearest ones of the next row to those beside them
 WIDEST = 2.0  # times the median of all: how wide a gap is at most
 FILLED = 0.8  # of the places in rows and columns have a marker
+SAME = 0.03  # of a distance, in the median: closer layouts are the same, and the first, from all distances, is better
 
 
 def in_rows(apart: Array, flat: Array) -> Array | None:
-    """(markers, 2) m, markers in rows and columns; None where they do not stand so.
+    """(markers, 2) m, markers in rows and columns; None where they do not stand so, or lie so in the first layout.
 
     Which marker stands where is read off a first layout `flat` (markers, 2), or off the order of the markers: row after
     row, each in the same direction or back and forth.
@@ -40,7 +41,13 @@ def in_rows(apart: Array, flat: Array) -> Array | None:
         longest = float((apart / over).max())
         if longest < least:
             best, least = layout, longest
-    return best
+    return None if best is None or _alike(best, flat) else best
+
+
+def _alike(layout: Array, flat: Array) -> bool:
+    """Whether two layouts (markers, 2) m have the same distances."""
+    one, other = (np.linalg.norm(x[:, None] - x[None], axis=2) + np.eye(len(x)) for x in (layout, flat))
+    return float(np.median(np.abs(other / one - 1.0))) < SAME
 
 
 def _shown(flat: Array) -> Iterator[Array]:

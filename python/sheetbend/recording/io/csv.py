@@ -164,8 +164,8 @@ def _check_times(path: Path, rows: list[Row], times: Array) -> None:
     previous = -np.inf
     for (line, cells), time in zip(rows, times, strict=True):
         if time == previous and len(cells) == 4:
-            fix = "name the marker of each row in a column marker; save points without names with sb.Cloud.of(...)"
-            refuse(path, line, "repeats the time of the row before", cells[0], fix)
+            fix = "name the marker of each row in a column marker; points without names are an sb.Cloud.of(...)"
+            refuse(path, line, "must have a time later than the row before", cells[0], fix)
         if not time > previous:
             refuse(path, line, "must have a time later than the row before", cells[0] or "an empty cell")
         previous = time
