@@ -21,8 +21,9 @@ class GeometricSteps:
         sum: (n,) where the last ones end, if three of them went on by one factor; None otherwise.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, wanted: bool = True) -> None:
         self._points: list[np.ndarray] = []
+        self._wanted = wanted
         self.sum: np.ndarray | None = None
 
     def add(self, point: np.ndarray) -> bool:
@@ -30,7 +31,7 @@ class GeometricSteps:
         was rejected, after which others are shorter: they begin anew."""
         stays = bool(self._points) and np.array_equal(self._points[-1], point)
         self._points = [point] if stays else [*self._points[-3:], point]
-        self.sum = self._summed()
+        self.sum = self._summed() if self._wanted else None
         return self.sum is not None
 
     def _summed(self) -> np.ndarray | None:

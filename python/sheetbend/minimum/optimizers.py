@@ -217,13 +217,13 @@ def _ceres(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: f
     watch = sums = True
     while True:
         left = max_iterations - spent[0]
-        steps = GeometricSteps() if sums and not problem.estimates_corrections else None
+        steps = GeometricSteps(wanted=sums and not problem.estimates_corrections)
         end, stopped = _ceres_holding(problem, w, held, left, tolerance, best, watch, steps, spent[0])
         spent = [a + b for a, b in zip(spent, (end.iterations, end.evaluations, end.jacobians), strict=True)]
         end = replace(end, iterations=spent[0], evaluations=spent[1], jacobians=spent[2])
         if end.interrupted or (stopped is None and not held):
             return end
-        if stopped is not None and steps is not None and steps.sum is not None:
+        if stopped is not None and steps.sum is not None:
             w = np.clip(steps.sum, *problem.coordinates.limits())
             sums = problem.cost(problem.coordinates.out(w)) < end.cost
             spent[1] += 1
@@ -261,7 +261,7 @@ def _ceres_holding(
     tolerance: float,
     best: _Best,
     watch: bool,
-    steps: GeometricSteps | None,
+    steps: GeometricSteps,
     first: int = 0,
 ) -> tuple[Minimum, np.ndarray | None]:
     """One run, whose iterations count on from `first`. It ends, and also returns that point, where its steps have a
@@ -279,9 +279,10 @@ def _ceres_holding(
         best(first + iteration, cost, coordinates.out(here))
         limited = (here <= lower) | (here >= upper)
         limited[list(held)] = False
-        summed = steps is not None and steps.add(here) and not limited.any()
-        if summed or (watch and iteration > 1 and (limited & before).any()):
+        if steps.add(here) and not limited.any():
             stopped = here
+        elif watch and iteration > 1 and (limited & before).any():
+            stopped, steps.sum = here, None
         before = limited
         return stopped is None
 

@@ -37,7 +37,8 @@ def relabeled(t: Array, positions: Array, names: Sequence[str]) -> tuple[Array, 
     if len(t) < FEWEST:
         return positions, []
     x, said = _put_back(t, positions, names)
-    extent = float(np.linalg.norm(np.nanmax(x, axis=(0, 1)) - np.nanmin(x, axis=(0, 1))))
+    near, far = np.nanquantile(x, [0.01, 0.99], axis=(0, 1))  # reflections may be far away
+    extent = float(np.linalg.norm(far - near))
     least = least_leap(t, extent)
     for k, name in enumerate(names):
         stray = elsewhere(t, x[:, k], least)
