@@ -126,7 +126,7 @@ TEST(NewtonByConjugateGradients, EndsWithItsIterations) {
 struct OneSided {
   double skew;
 
-  void multiply(const Numbers<double>& p, Numbers<double>& q) const {
+  void multiply(Numbers<double>& p, Numbers<double>& q) const {
     for (int i = 0; i < 4 * particles; ++i) {
       q[i] = i % 4 == 3 ? 0.0 : 4.0 * p[i];
       if (i >= 4) q[i] -= (1.0 + skew) * p[i - 4];
