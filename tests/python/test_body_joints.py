@@ -228,3 +228,5 @@ def test_bad_joints_are_refused() -> None:
         gate(9.81, tilt_damping=0.1)
     with pytest.raises(sb.SceneError, match="tilt_stiffness: must be positive"):
         gate(9.81, tilt_stiffness=-1.0)
+    with pytest.raises(sb.SceneError, match="viscosity: must not be negative"):
+        gate(9.81, viscosity=-0.1)

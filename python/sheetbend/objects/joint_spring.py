@@ -75,9 +75,7 @@ def hold_axis(made: Making, stiffness: float | None, damping: float | None) -> N
     if stiffness is None and damping is not None:
         fix = "add tilt_stiffness, or leave tilt_damping out"
         raise SceneError(f"{made.name}.tilt_damping", "acts where the axis gives way, and it is rigid", damping, fix)
-    for field, value, least in (("stiffness", stiffness, 0.0), ("damping", damping, -1e-300)):
-        if value is not None and not (is_number(value) and value > least):
-            raise SceneError(f"{made.name}.tilt_{field}", "must be positive", value, "give a positive number, or none")
+    _check(f"{made.name}.tilt_stiffness", stiffness, f"{made.name}.tilt_damping", damping)
     pairs = [(0, 1), (0, 2)]
     if stiffness is None:
         made.across(pairs)
@@ -88,12 +86,18 @@ def hold_axis(made: Making, stiffness: float | None, damping: float | None) -> N
         made.name_damping(group, f"{made.name}_tilt_damping", damping, "N m s/rad")
 
 
+def _check(field: str, stiffness: float | None, loss_field: str, loss: float | None) -> None:
+    """Refuse a stiffness that is not positive, and a loss that is negative."""
+    if stiffness is not None and not (is_number(stiffness) and stiffness > 0.0):
+        raise SceneError(field, "must be positive", stiffness, "give a positive number, or leave it out")
+    if loss is not None and not (is_number(loss) and loss >= 0.0):
+        raise SceneError(loss_field, "must not be negative", loss, "give zero or more, or leave it out")
+
+
 def _angle(made: Making, label: str, dial: int, stiffness: float | None, rest: float, viscosity: float | None) -> None:
     """A group `joint_angle`, whose numbers are quantities where they are given."""
     scene, name = made.scene, made.name
-    for field, value, least in (("stiffness", stiffness, 0.0), ("viscosity", viscosity, -1e-300)):
-        if value is not None and not (is_number(value) and value > least):
-            raise SceneError(f"{name}.{field}", "must be positive", value, "give a positive number, or leave it out")
+    _check(f"{name}.stiffness", stiffness, f"{name}.viscosity", viscosity)
     if not is_number(rest):
         raise SceneError(f"{name}.rest", "must be a finite number", rest, "give rad")
     zero: Expression | float = 0.0
