@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from ..report.fit_result import FitResult
+from ..report.resting import told_to_rest
 from .model import NAME
 
 UNIT = 1.0  # kg/m
@@ -31,12 +33,13 @@ _UNIT = re.compile("|".join(rf"(?<![\w/^]){re.escape(unit)}(?![\w/^])" for unit 
 
 def over_density(result: FitResult) -> FitResult:
     """The same fit with each quantity that has a mass in it over the density: names, units and words; numbers are
-    those for 1 kg/m."""
+    those for 1 kg/m. The density is none of what they rest on."""
+    result = replace(result, premises=tuple(p for p in result.premises if p.name != _DENSITY))
+    result = replace(result, estimates=told_to_rest(result))
     data = result.to_dict()
     units = {e.name: e.unit for e in result.estimates} | {g.name: g.unit for g in result.given}
     units |= {p.name: p.unit for p in result.premises}
     names = sorted((name for name, unit in units.items() if unit in UNITS), key=len)[::-1]
-    data["premises"] = [p for p in data["premises"] if p["name"] != _DENSITY]
     data["given"] = [g for g in data["given"] if g["name"] != _DENSITY]
     return FitResult.from_dict(_renamed(data, re.compile(rf"\b(?:{'|'.join(map(re.escape, names))})\b(?!/density)")))
 

@@ -24,6 +24,7 @@ STANDS = ("identified", "weak")
 NAMED = 0.85 / 0.15
 """An error is named where it leaves so many times what else the fit leaves beyond noise (doubts.causes.MOST)."""
 SURELY = 2.0  # standard deviations of the sum of squares of noise, which nobody tells from what is left beyond it
+_IF = "if the error in "
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class Rests:
     def words(self) -> str:
         """Behind a verdict."""
         more = f" and {self.others} other given value{'s are' if self.others > 1 else ' is'} right too"
-        return f"if the error in {self.name} is below {self.size}{more if self.others else ''}"
+        return f"{_IF}{self.name} is below {self.size}{more if self.others else ''}"
 
 
 def rests(result: FitData) -> dict[str, Rests]:
@@ -68,12 +69,13 @@ def needed(result: FitData) -> dict[str, str]:
 
 
 def told_to_rest(result: FitData) -> tuple[Estimate, ...]:
-    """The estimates, each with what it rests on in its words, and with its half-width in all."""
+    """The estimates, each with what it rests on in its words, in place of what was said there before, and with its
+    half-width in all."""
     found = rests(result)
     return tuple(
         replace(
             e,
-            words=f"{e.words}, {found[e.name].words}" if e.name in found else e.words,
+            words=", ".join([e.words.partition(f", {_IF}")[0], *([found[e.name].words] if e.name in found else [])]),
             in_all=math.hypot(e.half_width, *(may for may, *_ in _may_move(result, e)))
             if e.half_width and e.verdict in STANDS and result.premises
             else None,
