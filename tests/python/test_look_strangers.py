@@ -10,7 +10,6 @@ import pytest
 import sheetbend as sb
 from commands import run
 from sheetbend.config import build, parse
-from sheetbend.doubts.conclude import _mended
 from sheetbend.look import Draft, Take, draft, seen
 
 EXPERIMENTS = Path(__file__).parents[2] / "experiments"
@@ -219,7 +218,7 @@ def test_labels_that_are_exchanged_and_reflections(tmp_path: Path) -> None:
     (tmp_path / "take.toml").write_text(text)
     (experiment,) = build(parse(tmp_path / "take.toml"), tmp_path).experiments
     assert np.array_equal(experiment.recording.positions, mended.positions, equal_nan=True)
-    assert _mended(experiment.recording) == said  # a fit warns of it
+    assert experiment.recording.mends == said  # a fit warns of them
     kind = tomllib.loads(text)["scene"]
     (rope,) = kind.get("rope", kind.get("rod"))
     assert rope["length"] == pytest.approx(1.0, rel=0.01)

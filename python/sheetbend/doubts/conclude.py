@@ -15,7 +15,6 @@ from ..minimum.optimizers import Minimum
 from ..minimum.problem import FitProblem
 from ..quantities.parameters import Parameters
 from ..quantities.wording import short
-from ..recording.recording import Recording
 from ..result.estimate import UNSOUND, Estimate
 from ..result.result import Misfit
 from ..statistics.identifiability import Identifiability, identify
@@ -183,7 +182,7 @@ def warnings_of(
             start = problem.parameters[e.name].initial
             where = f"{short(start or 0.0)} to {short(e.value)} {e.unit}".rstrip()
             warnings.append(f"{e.name} ran off from {where}, and the others were fitted with it there")
-    warnings += [f"{e.name}: {words}" for e in problem.experiments for words in _mended(e.recording)]
+    warnings += [f"{e.name}: {words}" for e in problem.experiments for words in e.recording.mends]
     if best.cost == 0.0:
         warnings.append("the residuals are exactly zero: intervals have no width, and nothing tells how wrong they are")
     if best.converged and best.doubt:
@@ -202,9 +201,3 @@ def warnings_of(
     if not best.converged and not best.interrupted:
         warnings.append(f"the fit did not converge: {best.message.rstrip('.')}" + (f"; {ahead}" if ahead else ""))
     return tuple(warnings)
-
-
-def _mended(recording: Recording) -> list[str]:
-    """What was done to a recording whose markers had been confused (`Recording.mended`)."""
-    words = recording.metadata.get("mended", [])
-    return [str(one) for one in words] if isinstance(words, list) else []

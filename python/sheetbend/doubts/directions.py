@@ -72,14 +72,17 @@ def clearly(
     _, r, J = problem.evaluate(u)
     layout, taken = problem.rows_layout(), sum(map(problem.core.absorbed, range(len(problem.experiments))))
     column = np.where(mine, column, 0.0)
-    asked = asked_for(r, J, column, mine, layout, taken)
-    if asked is None or not (asked.explained > EXPLAINS and asked.chance < LEVEL / tests):
+
+    def clear(J: Array) -> Asked | None:
+        asked = asked_for(r, J, column, mine, layout, taken)
+        return asked if asked is not None and asked.explained > EXPLAINS and asked.chance < LEVEL / tests else None
+
+    if (asked := clear(J)) is None:
         return None
     if changed := shifts():
         columns = np.column_stack(changed)
         J = np.hstack([J, np.vstack([columns, np.zeros((len(r) - len(columns), columns.shape[1]))])])
-        asked = asked_for(r, J, column, mine, layout, taken)
-        if asked is None or not (asked.explained > EXPLAINS and asked.chance < LEVEL / tests):
+        if (asked := clear(J)) is None:
             return None
     errors = driven_errors(problem, u, FEW)
     if errors.size:

@@ -129,9 +129,9 @@ def _looked_at(s: Seen, base: tuple[int, ...], tip: tuple[int, ...], length: flo
 
 
 def _lines(take: Take, tip: tuple[int, ...], beam: Beam, measured: Measured) -> list[str]:
-    s, r, length = take.seen, take.seen.recording, beam.length
+    r, length = take.seen.recording, beam.length
     density = 1.0 if measured.density is None else measured.density
-    lines = [] if s.up_by == "file" else table("[scene]", {"gravity": s.gravity.tolist()})
+    lines = take.scene_lines
     step = float(np.median(np.diff(r.times)))
     lines += table(
         "[solver]", {"substeps": max(1, int(np.ceil(step * 50 * beam.frequency)))}, {"substeps": "per frame"}

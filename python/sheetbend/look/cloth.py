@@ -210,7 +210,7 @@ def _wind(s: Seen, own: list[int], row: list[int], up: Array, density: float) ->
 
 def _lines(takes: Sequence[Take], sheets: Sequence[Sheet], density: float, measured: Measured) -> list[str]:
     s, r = takes[0].seen, takes[0].seen.recording
-    lines = [] if s.up_by == "file" else table("[scene]", {"gravity": s.gravity.tolist()})
+    lines = takes[0].scene_lines
     solver: dict[str, Any] = {"method": "newton"}
     if not s.static:
         if sheets[0].ride is not None:  # its clock is not that of the frames

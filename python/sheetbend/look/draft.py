@@ -98,8 +98,7 @@ def _told(takes: Sequence[Take], up: int | None) -> list[str]:
             + (f", {lost:.2%} of the samples not seen" if lost else "")
             + (f", noise {1e3 * take.seen.noise:.2g} mm in each coordinate" if take.seen.noise else "")
         )
-        mended = r.metadata.get("mended", [])
-        said += mended if isinstance(mended, list) else []
+        said += r.mends
     first = takes[0].seen
     pieces = first.recording.metadata.get("joined", {})
     if isinstance(pieces, dict) and pieces:

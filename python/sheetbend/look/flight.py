@@ -162,7 +162,7 @@ def _lines(take: Take, flight: Flight, reach: float) -> list[str]:
     s, r = take.seen, take.seen.recording
     t = r.times[flight.frames]
     step, spin = float(np.median(np.diff(r.times))), float(np.linalg.norm(flight.start["spin"]))
-    lines = [] if s.up_by == "file" else table("[scene]", {"gravity": s.gravity.tolist()})
+    lines = take.scene_lines
     lines += table("[solver]", {"substeps": int(np.ceil(step * max(1.0 / SUBSTEP, spin / TURN)))})
     body: dict[str, Any] = {"name": "body", "mass": 1.0, "inertia": flight.inertia.tolist()} | flight.start
     said = {"mass": "kg, not known: see above", "inertia": "kg m^2, of equal masses at the markers"}

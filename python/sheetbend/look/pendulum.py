@@ -50,7 +50,7 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     ]
     # The plane is y = 0: elsewhere rounding moves the arms out of it, and the fold of their triangles grows.
     pivot = (np.nanmean(x[:, joints[0]], axis=0) * (1.0, 0.0, 1.0)).tolist()
-    lines = [] if s.up_by == "file" else table("[scene]", {"gravity": s.gravity.tolist()})
+    lines = takes[0].scene_lines
     swing, pieces = _swing(x, r.times, joints), _pieces(s, takes[0], len(arms))
     step = float(np.median(np.diff(r.times)))
     lines += table("[solver]", {"substeps": max(1, int(np.ceil(step / SUBSTEP - 1e-9)))})

@@ -118,7 +118,7 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
                 unknown.append(SPIN)
         begins = _beginning(s, found, rope, kind == "rod")
         notes += begins if pushed is None else [pushed]
-    lines = [] if s.up_by == "file" else table("[scene]", {"gravity": s.gravity.tolist()})
+    lines = takes[0].scene_lines
     if not s.static:
         step = float(np.median(np.diff(r.times)))
         lines += table("[solver]", {"substeps": max(1, int(np.ceil(step / SUBSTEP - 1e-9)))}, {"substeps": "per frame"})

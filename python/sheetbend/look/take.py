@@ -10,6 +10,7 @@ import numpy as np
 from ..arrays.timeseries import default_max_gap
 from .robot import Poses
 from .seen import Seen
+from .text import table
 
 
 @dataclass(frozen=True)
@@ -23,8 +24,12 @@ class Take:
     @property
     def reading(self) -> dict[str, Any]:
         """Keys of [[recording]] that say how the file is read."""
-        mended = "mended" in self.seen.recording.metadata
-        return {"file": self.file, "units": self.units, "mend": True if mended else None}
+        return {"file": self.file, "units": self.units, "mend": True if self.seen.recording.mends else None}
+
+    @property
+    def scene_lines(self) -> list[str]:
+        """Those of [scene]: gravity, where the file does not tell it."""
+        return [] if self.seen.up_by == "file" else table("[scene]", {"gravity": self.seen.gravity.tolist()})
 
 
 @dataclass(frozen=True)

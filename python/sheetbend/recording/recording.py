@@ -245,9 +245,15 @@ class Recording(MarkerData):
         positions[:, self.clamped] = closed
         return self._derive(positions=positions)
 
+    @property
+    def mends(self) -> list[str]:
+        """What `mended` did, in sentences; metadata["mended"] keeps them."""
+        said = self.metadata.get("mended", [])
+        return [str(one) for one in said] if isinstance(said, list) else []
+
     def mended(self) -> Recording:
         """Put markers that exchange their labels back, and take those that are elsewhere for some frames as not seen
-        there. metadata["mended"] lists what was done. Returns the same object where nothing was wrong."""
+        there. `mends` tells what was done. Returns the same object where nothing was wrong."""
         positions, said = relabeled(self.times, self.positions, self.markers)
         return self._derive(positions=positions, metadata={**self.metadata, "mended": said}) if said else self
 

@@ -34,11 +34,10 @@ from ..arrays.timeseries import Array
 from ..errors import InputError
 from .layout import Layout
 from .newey_west import newey_west
-from .row_grid import RowGrid
+from .row_grid import ZERO, RowGrid
 from .spectral import spectral_covariance
 
 NEGLIGIBLE = 1e-10  # share of a parameter's variance
-_ZERO = 1e-290  # sum of squares: the numbers are so small that ratios of them are rounding
 
 
 @dataclass(frozen=True)
@@ -117,7 +116,7 @@ class Sandwich:
         if rows - absorbed < 0.5:
             raise InputError("residuals", "must outnumber the free parameters", rows, f"give more than {count} rows")
         self._degrees = rows - absorbed
-        self._residuals = residuals if float(residuals @ residuals) >= _ZERO else np.zeros(rows)
+        self._residuals = residuals if float(residuals @ residuals) >= ZERO else np.zeros(rows)
         self._layout = layout
 
     def of_estimate(self) -> Covariance:

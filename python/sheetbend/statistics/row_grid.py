@@ -9,7 +9,7 @@ from ..arrays.timeseries import Array
 from .colored import Part
 from .layout import Integers, Layout
 
-_ZERO = 1e-290  # sum of squares: the numbers are so small that ratios of them are rounding
+ZERO = 1e-290  # sum of squares: the numbers are so small that ratios of them are rounding
 _SILENT = 1e-20  # of the loudest kind's sum of squares: rounding, which has no spectrum
 
 
@@ -84,7 +84,7 @@ class RowGrid:
         matrix = self.residuals.T @ self.residuals / np.sqrt(np.outer(number, number))
         matrix[self.recordings[:, None] != self.recordings] = 0.0
         pooled = np.bincount(kinds, (self.residuals**2).sum(0)) / np.bincount(kinds, number)
-        size = np.sqrt(np.maximum(pooled, _ZERO))[kinds]
+        size = np.sqrt(np.maximum(pooled, ZERO))[kinds]
         return np.asarray(matrix / np.outer(size, size))
 
 
