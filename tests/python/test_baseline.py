@@ -45,8 +45,8 @@ def test_rest_is_the_mean_of_what_is_seen() -> None:
     x[2:, 1] = NAN
     recording = Recording(x, np.arange(4.0))
     assert rest_baseline(recording).tolist() == [[3.0, 0.0, 0.0], [0.0, 0.0, 6.0]]
-    windowed = rest_baseline(recording, start=2.0)
-    assert windowed[0].tolist() == [5.5, 0.0, 0.0] and np.isnan(windowed[1]).all()
+    late = rest_baseline(recording.piece(2.0))
+    assert late[0].tolist() == [5.5, 0.0, 0.0] and np.isnan(late[1]).all()
     two = rest_baseline([recording.piece(0, 1), recording.piece(3)])
     assert two.tolist() == [[4.5, 0.0, 0.0], [0.0, 0.0, 4.0]]
     with pytest.raises(RecordingError, match="at least one"):

@@ -72,9 +72,9 @@ def _draw_drape(study: FabricStudy, found: WholeFabric, path: Path) -> None:
     plotting.save(panel, path)
 
 
-def _radii(x: np.ndarray, y: np.ndarray, count: int = 360) -> np.ndarray:
-    """(count,) of an outline about the origin, at even angles from 0."""
+def _radii(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """The distance of an outline from the origin, at 360 even angles from 0."""
     angle = np.arctan2(y, x) % (2.0 * np.pi)
     order = np.argsort(angle)
-    at = 2.0 * np.pi * np.arange(count) / count
+    at = 2.0 * np.pi * np.arange(360) / 360
     return np.interp(at, angle[order], np.hypot(x, y)[order], period=2.0 * np.pi)

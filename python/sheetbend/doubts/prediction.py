@@ -49,13 +49,11 @@ class Comparison:
     without_physics: Mapping[str, float] = field(default_factory=dict)
     forces: tuple[ForceComparison, ...] = ()
 
-    def rms(
-        self, frames: np.ndarray, predicted: np.ndarray | None = None, scored: np.ndarray | None = None
-    ) -> float | None:
+    def rms(self, frames: np.ndarray, predicted: np.ndarray | None = None) -> float | None:
         """Root mean square distance [m] over seen markers in some frames, along the experiment's axes."""
         axes = ["xyz".index(a) for a in self.experiment.axes]
         predicted = self.simulated if predicted is None else predicted
-        seen = self.recording.mask[frames] if scored is None else scored
+        seen = self.recording.mask[frames]
         d2 = ((predicted - self.recording.positions)[frames][..., axes] ** 2).sum(axis=-1)
         return float(np.sqrt(d2[seen].mean())) if seen.any() else None
 

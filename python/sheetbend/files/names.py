@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import unicodedata
 
-from ..errors import InputError, RecordingError
+from ..errors import RecordingError
 
 LONGEST = 100
 """Bytes of UTF-8 in a name: two names, what stands between them and a suffix fit into the 255 of a file name."""
@@ -39,17 +39,17 @@ def flaw(name: str) -> tuple[str, str] | None:
     return None
 
 
-def checked_name(field: str, name: object, error: type[InputError] = RecordingError) -> str:
-    """The name, where it can be that of a file: not empty, no path, nothing hidden, at most `LONGEST` bytes.
+def checked_name(field: str, name: object) -> str:
+    """Return the name if a file can have it: not empty, no path, nothing hidden, at most `LONGEST` bytes.
 
     Raises:
-        InputError: it is no such text; of the class `error`.
+        RecordingError: it is no such text.
     """
     if not isinstance(name, str) or not name:
-        raise error(field, "must be a non-empty string", name, "give a name")
+        raise RecordingError(field, "must be a non-empty string", name, "give a name")
     found = flaw(name)
     if found is not None:
-        raise error(field, found[0], name, found[1])
+        raise RecordingError(field, found[0], name, found[1])
     return name
 
 

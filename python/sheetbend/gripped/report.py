@@ -51,13 +51,13 @@ class RopeReport:
         notes = tuple(f"unseen recording {note}" for note in (self.unseen.notes if self.unseen is not None else ()))
         return replace(result, warnings=(*result.warnings, *self.found.warnings, *notes, *more))
 
-    def plain(self, width: int = 100) -> str:
+    def plain(self) -> str:
         """As plain text."""
-        lines = [f"{self.name}, a rope between two grips", "", report.plain(self.result, width)]
+        lines = [f"{self.name}, a rope between two grips", "", report.plain(self.result)]
         for section in self.sections():
-            lines += [*plain_section(section, width), ""]
+            lines += [*plain_section(section), ""]
         if self.unseen is not None and self.unseen.scores is not None:
-            lines.append(self.unseen.scores.report(width))
+            lines.append(self.unseen.scores.report())
         return "\n".join(lines)
 
     def rich(self) -> Group:

@@ -68,30 +68,24 @@ def hold_baseline(recording: Recording) -> Array:
     return np.broadcast_to(_first_seen(recording), recording.positions.shape).copy()
 
 
-def rest_baseline(
-    fitted: Recording | Sequence[Recording], start: float | None = None, stop: float | None = None
-) -> Array:
+def rest_baseline(fitted: Recording | Sequence[Recording]) -> Array:
     """The rest shape: each marker's mean position over the frames in which it is seen.
 
     Args:
         fitted: one recording, or several of the same markers (rehangings of one wire), whose frames all
             count alike.
-        start: s, where the window that is averaged begins (`Recording.piece`); None = at the first frame.
-        stop: s, where it ends, for example at a release; None = with the last frame.
 
     Returns:
         (markers, 3) m; NaN for a marker not seen there.
 
     Raises:
-        RecordingError: the recordings have different markers, there is none, or the window holds no frame.
+        RecordingError: the recordings have different markers, or there is none.
     """
     recordings = [fitted] if isinstance(fitted, Recording) else list(fitted)
     if not recordings:
         raise RecordingError("fitted", "must hold at least one recording", 0, "give what was fitted")
     for other in recordings[1:]:
         _check_same_markers(recordings[0], other)
-    if start is not None or stop is not None:
-        recordings = [recording.piece(start, stop) for recording in recordings]
     return mean_position(np.concatenate([recording.positions for recording in recordings]))
 
 

@@ -22,7 +22,7 @@ from .report_recordings import forces, held_out_motion, recordings
 from .report_shot import shot_motions
 from .report_starts import groups_of_starts, starts_note
 from .resting import PLAUSIBLE, Rests, rests
-from .tables import Section, plain_section, rich_section, wide
+from .tables import WIDTH, Section, plain_section, rich_section, wide
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -81,13 +81,13 @@ def headline(result: FitData) -> str:
     return f"{end} after {turns}, {result.seconds:.3g} s, {result.optimizer}"
 
 
-def plain(result: FitData, width: int = 100) -> str:
-    """The report as plain text, at most `width` columns where the names allow it."""
+def plain(result: FitData) -> str:
+    """The report as plain text, at most `WIDTH` columns where the names allow it."""
     lines = [f"Fit {headline(result)}"]
     if result.message:
-        lines += textwrap.wrap(result.message, width, initial_indent="  ", subsequent_indent="  ")
+        lines += textwrap.wrap(result.message, WIDTH, initial_indent="  ", subsequent_indent="  ")
     for section in sections(result):
-        lines += ["", *plain_section(section, width)]
+        lines += ["", *plain_section(section)]
     return "\n".join(lines) + "\n"
 
 

@@ -58,9 +58,9 @@ class Scores:
         blends = [row.blend for row in self.rows if row.blend is not None]
         return float(np.mean(blends)) if len(blends) == len(self.rows) else None
 
-    def report(self, width: int = 100) -> str:
-        """The table as plain text, its notes wrapped at `width` columns."""
-        return "\n".join(plain_section(self._section(), width)) + "\n"
+    def report(self) -> str:
+        """The table as plain text, its notes wrapped at 100 columns."""
+        return "\n".join(plain_section(self._section())) + "\n"
 
     def rich_report(self) -> Group:
         """The table for rich terminals.

@@ -8,6 +8,9 @@ from dataclasses import dataclass
 
 from ..optional import require
 
+WIDTH = 100
+"""Columns of a report."""
+
 _COLORS = {
     "identified": "green",
     "weak": "yellow",
@@ -31,12 +34,12 @@ class Section:
     notes: tuple[tuple[str, str], ...] = ()
 
 
-def plain_section(section: Section, width: int = 100) -> list[str]:
-    """The lines of a part: its title, its table, its notes wrapped at `width` columns."""
+def plain_section(section: Section) -> list[str]:
+    """The lines of a part: its title, its table, its notes wrapped at `WIDTH` columns."""
     lines = [section.title, "-" * len(section.title), *_table(section)]
     if section.rows and section.notes:
         lines.append("")
-    return lines + _notes(section.notes, width)
+    return lines + _notes(section.notes)
 
 
 def rich_section(section: Section) -> list[object]:
@@ -56,9 +59,9 @@ def rich_section(section: Section) -> list[object]:
     return parts
 
 
-def wide(lines: Sequence[tuple[str, ...]], width: int = 100) -> bool:
+def wide(lines: Sequence[tuple[str, ...]]) -> bool:
     """Whether a table of these lines, its headers first, is wider than a report."""
-    return sum(2 + max(map(len, column)) for column in zip(*lines, strict=True)) > width
+    return sum(2 + max(map(len, column)) for column in zip(*lines, strict=True)) > WIDTH
 
 
 def _table(section: Section) -> list[str]:
@@ -97,13 +100,13 @@ def flush_left(section: Section) -> list[bool]:
     return [header in words for header in section.headers]
 
 
-def _notes(notes: Iterable[tuple[str, str]], width: int) -> list[str]:
+def _notes(notes: Iterable[tuple[str, str]]) -> list[str]:
     lines: list[str] = []
     for label, sentence in notes:
         text = f"{label}: {sentence}" if label else sentence
         lines += textwrap.wrap(
             text,
-            width,
+            WIDTH,
             initial_indent="  ",
             subsequent_indent="    ",
             break_on_hyphens=False,

@@ -190,12 +190,12 @@ def _spread(corners: Array, count: int) -> Array:
     return np.asarray(np.einsum("kc,kcx->kx", weights, own))
 
 
-def _sections(corners: Array, cuts: int = 3) -> Array:
-    """(lines, 2, 3) where planes across the three axes cut triangles (m, 3, 3), some planes for each axis."""
+def _sections(corners: Array) -> Array:
+    """(lines, 2, 3) where planes across the three axes cut triangles (m, 3, 3), three planes for each axis."""
     lines = []
     for axis in range(3):
         low, high = corners[..., axis].min(), corners[..., axis].max()
-        for height in low + (high - low) * (np.arange(cuts) + 0.5) / cuts:
+        for height in low + (high - low) * (np.arange(3) + 0.5) / 3:
             above = corners[..., axis] > height
             cut = corners[(above.sum(axis=1) % 3) > 0]
             side = cut[..., axis] > height

@@ -69,12 +69,11 @@ class Chain:
         rest: (rows,) what is left of the residuals.
     """
 
-    def __init__(self, windows: Sequence[Window], gaps: Sequence[Gap], damping: float = 0.0) -> None:
+    def __init__(self, windows: Sequence[Window], gaps: Sequence[Gap]) -> None:
         """
         Args:
             windows: one for each state.
             gaps: one for each pair of neighbors.
-            damping: of the size of a state's columns; steps of the states get shorter with it.
         """
         self._rows: list[tuple[Array, Array, Array, Array]] = []  # of each state: own, next, border, residual
         p = windows[0].border.shape[1]
@@ -92,7 +91,7 @@ class Chain:
             M = np.vstack(parts)
             size = np.maximum(np.linalg.norm(M[:, :q], axis=0), np.finfo(float).tiny)
             weak = np.zeros((q, M.shape[1]))
-            weak[:, :q] = np.diag(max(damping, WEAK) * size)
+            weak[:, :q] = np.diag(WEAK * size)
             R = np.asarray(np.linalg.qr(np.vstack([M, weak]), mode="r"))
             self._rows.append((R[:q, :q], R[:q, q : q + onward], R[:q, q + onward : -1], R[:q, -1]))
             carried = R[q:, q:]

@@ -82,10 +82,10 @@ def _lagged(first: Array, second: Array, count: int) -> Array:
     return np.array([np.vdot(x[: frames - lag], y[lag:]) if lag < frames else 0.0 for lag in range(count)])
 
 
-def autocorrelation(residuals: Array, layout: Layout, lags: int = _MAX_ORDER) -> Array:
+def autocorrelation(residuals: Array, layout: Layout) -> Array:
     """(lags,) correlation of residuals with those of the same series 1, 2, ... frames later, over all series."""
     if not residuals.any():
         return np.zeros(0)
     grid = RowGrid(layout, residuals)
-    sums = grid.lags((np.abs(grid.transform(grid.residuals)) ** 2).sum(1), min(lags, grid.frames // 2))
+    sums = grid.lags((np.abs(grid.transform(grid.residuals)) ** 2).sum(1), min(_MAX_ORDER, grid.frames // 2))
     return np.asarray(sums[1:] / sums[0])
