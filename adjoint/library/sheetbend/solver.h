@@ -19,7 +19,7 @@ enum class Method {
   direct,        ///< each connected part by its constraints: for ropes
   newton,        ///< the same parts by their particles: for cloth; each rigid row costs a solve more
   newton_cg,     ///< the same by conjugate gradients: for cloth of more than some 20,000 vertices
-  implicit,      ///< each substep solved until its forces balance; no rods
+  implicit,      ///< each substep iterated until its forces balance: for contacts
   gauss_seidel,  ///< colored sweeps
 };
 

@@ -27,26 +27,26 @@ class Solver:
     Attributes:
         h: substep, s. Constant within a rollout.
         integrator: "bdf2" (second order, the default) or "bdf1" (backward Euler: damps like zeta = omega h/2).
-        method: "direct" (each connected part is one block, solved for the multipliers of its constraints: for ropes;
-            the default), "newton" (the same blocks, solved for their particles: for cloth; each rigid row, of
-            compliance 0, costs a solve more), "newton_cg" (the same by conjugate gradients on two levels: for cloth of
-            more than some 20,000 vertices, in half the memory), "implicit" (each substep is solved until its forces
-            balance: for fabrics that stiffen strongly, and for contacts; no rods) or "gauss_seidel" (colored sweeps;
-            unconverged ones add about 0.9 h^2/(m sweeps) of compliance per link).
-        iterations: Newton iterations of a block (2 by default), sweeps (10 by default), or the Newton matrices that an
-            "implicit" substep may take (100 by default): to need more is an error.
-        threads: of one rollout; results do not depend on it.
+        method: "direct" (each connected part is one block, solved for the multipliers of its constraints: for ropes
+            and rods; the default), "newton" (the same blocks, solved for the positions of their particles: for cloth;
+            each rigid row, of compliance 0, costs one more solve), "newton_cg" (as "newton", by conjugate gradients on
+            two levels: for cloth of more than some 20,000 vertices, in half the memory), "implicit" (each substep is
+            iterated until its forces balance: for contacts, and for fabrics that stiffen strongly) or "gauss_seidel"
+            (colored sweeps; unconverged ones add about 0.9 h^2/(m sweeps) of compliance per link).
+        iterations: Newton iterations of a block (2 by default), sweeps (10 by default), or the largest number of Newton
+            matrices of an "implicit" substep (100 by default); if it needs more, it raises an error.
+        threads: threads of one rollout; results do not depend on it.
         grain: constraints per thread below which a color is not split.
-        force_tolerance: what "implicit" may leave of the forces that act along a coordinate, relative to their largest
-            sum. A motion and its gradient are as exact as forces balance.
+        force_tolerance: largest unbalanced force along a coordinate at which "implicit" stops, relative to the largest
+            sum of forces. The motion and its gradient are as exact as the forces balance.
         cg_tolerance: relative residual at which conjugate gradients stop ("newton_cg" runs them twice per solve).
-        cg_iterations: conjugate gradients that a solve may take; to need more is an error.
-        memory: budget of a gradient through a rollout, such as "2 GB" or a number of bytes: what does not fit on the
-            tape is computed again, with the same result. By default half of the memory that is free when it is
-            recorded. `tape_plan` tells what a budget costs. Tangents (`fit`, forward mode) keep no tape.
+        cg_iterations: largest number of conjugate gradients of a solve; if it needs more, it raises an error.
+        memory: memory of a gradient through a rollout, such as "2 GB" or a number of bytes. What does not fit on the
+            tape is computed again, with the same result. By default half of the memory that is free at the recording.
+            `tape_plan` predicts the cost. Tangents (`fit`, forward mode) keep no tape.
         extrapolate: number of runs that are combined at the frames: 1 (off, the default); 2, at h and h/2, third order
-            with "bdf2"; 3, at h, h/2 and h/4, fourth order, in seven times the substeps of one run. For smooth motions:
-            scenes where something yields or with linear knots of driven particles are refused, and so is "gauss_seidel"
+            with "bdf2"; 3, at h, h/2 and h/4, fourth order, with seven times the substeps of one run. For smooth
+            motions: it refuses scenes that yield, scenes with linear knots of driven particles, and "gauss_seidel"
             (and with it tethers), whose error comes from sweeps. Scenes with contacts take 2 with "bdf1".
     """
 
