@@ -122,58 +122,64 @@ def fit(
         scene: a scene with its `recording` (and any field of `Experiment` as keyword), or one or several experiments.
         parameters: what to fit: names of quantities, `Parameter`s, or a mapping from name to fields of `Parameter`.
         optimizer: "ceres", "scipy", or "auto" (Ceres where it was built).
-        starts: further starting values by name; the best end wins, all are reported. Or a number of starts: the initial
-            one and others from a Sobol sequence, over the priors, between bounds, or two decades about the initial
-            value. They are raced through the windows with a loose tolerance, and the best of each group that ends in
-            the same minimum is fitted (`sheetbend.minimum.race`). A start at a bound is moved off it by 5 % of the
-            range.
-        windows: s, increasing: so much of every motion from its scene's start on is fitted first, one after another,
-            each from where the one before ended. "auto" chooses the lengths, and none where the first step on the whole
-            motion keeps what it promises; () for none.
-        tolerance: relative change of the cost that counts as none.
-        refine: "auto" moves the estimates to the limit of short substeps and counts what that leaves open in the
-            intervals, at the cost of some three evaluations with tangents. A `Refinement` says more, above all how to
-            make the same experiments on a finer mesh, to whose limit the estimates are moved as well; "auto" does not
-            know how, and "mesh not counted" stands in the table then. Where the data speak against a limit, as those
-            of a recording do that was simulated at the same substep, the estimate stays, and all that it would move
-            counts. False (or None) counts nothing.
-        systematic: (problem, internal minimum) -> half-widths of what else the intervals are to count, by parameter, in
-            its unit.
-        given: standard deviations of numbers that the fit takes as given, by name; they then count in the intervals. Of
-            quantities that must be positive it is relative (`{"rope_density": 0.02}` is 2 %), of others in their unit;
-            "gravity" (its direction), "clamp_direction" and "collider_direction" (of each about each axis) are in rad,
-            "clamps", "markers", "marker_offset" (from a rope's axis) and "drive_place" in m, "recording_delay" in s,
-            "marker_mass" (of each, which the model does not have) in kg, and relative are "gravity_size",
-            "recording_clock" (its frame rate), "recording_size" and "drive_size" (how far what drives the scene moves).
-            What each of these numbers moves is in `FitResult.premises` in any case.
-        smooth: fields of stiffness (`stiffness_modes` of a cloth or a solid of clusters) that are fitted with a
-            smoothness prior, by name, such as {"toy_stiffness": sb.Smooth()}. The size and the length of the prior are
-            found from the recordings where `Smooth` does not give them (`FitResult.fields`).
-        leave_one_out: also predict every recording that holds nothing out by a fit to the others.
-        profiles: follow the cost to the ends of every interval, all other parameters fitted again; of more than 60
-            parameters only for weak ones. Without, intervals are the linear ones, which cost nothing beside the fit.
-        bootstrap: number of fits to data that are drawn from these with replacement, 0 for none: whole recordings where
-            there are eight or more, else stretches of each that are four autocorrelation times long. Each costs some
-            two Jacobians. Their scatter gives intervals that assume nothing of the noise (`FitResult.bootstrap`).
-        beginnings: also fit the beginnings of the motions by themselves, to doubt what they contradict and to search on
-            from there (`sheetbend.doubts.beginnings`). That costs about as much as the fit itself.
-        max_iterations: per start and window.
-        threads: over experiments and Jacobian columns; the result does not depend on it.
-        progress: called after every iteration.
-        journal: file that keeps every evaluation until the fit is done (see `sheetbend.minimum.journal`). After a kill,
-            the same call with the same file goes on from there and gives the same bits; with another recording, scene
-            or version it is refused.
-        executor: shares out evaluations of several experiments, raced starts, profiles, bootstraps and leave-one-out to
-            its workers, such as those of `concurrent.futures.ProcessPoolExecutor(2)`; the result has the same bits.
-            Only this process writes the journal.
+        starts: further starting values by name; the start with the lowest final cost wins, and the report lists all.
+            Or a number of starts: the initial values and others from a Sobol sequence, drawn from the priors, between
+            the bounds, or over two decades about the initial value. All of them are fitted to longer and longer
+            windows with a loose tolerance. Those that end in the same minimum form a group, and the best of each group
+            is fitted to the end (`sheetbend.minimum.race`). A start at a bound is moved off it by 5 % of the range.
+        windows: s, increasing: the fit begins with this much of every motion, counted from its scene's start. Each
+            window starts from the result of the one before. "auto" chooses the lengths; it skips the windows if the
+            first step on the whole motion lowers the cost about as much as predicted. () for none.
+        tolerance: the fit stops when the cost changes by less than this share.
+        refine: "auto" moves the estimates to the limit of short substeps. The intervals include the error that remains.
+            This costs about three evaluations with tangents. A `Refinement` can also build the same experiments on a
+            finer mesh, and the estimates are then moved to the limit of fine meshes too; without one, the table says
+            "mesh not counted". If the data contradict a limit (for example those of a recording that was simulated at
+            the same substep), the estimate stays and the whole shift widens its interval. False or None: no limits,
+            and the intervals do not include these errors.
+        systematic: function of (problem, internal minimum) that returns further half-widths to include in the
+            intervals, by parameter and in its unit.
+        given: standard deviations of values that the fit takes as given, by name; the intervals then include them. They
+            are relative for quantities that must be positive (`{"rope_density": 0.02}` is 2 %), and in the quantity's
+            unit for others. The names of what is no quantity are
+
+            - in rad: "gravity" (its direction), "clamp_direction" and "collider_direction" (each about each axis);
+            - in m: "clamps", "markers", "marker_offset" (from a rope's axis), "drive_place";
+            - in s: "recording_delay"; in kg: "marker_mass" (of each marker that has no mass in the model);
+            - relative: "gravity_size", "recording_clock" (its frame rate), "recording_size", "drive_size" (how far the
+              scene is driven).
+
+            `FitResult.premises` holds the effect of each given value in any case.
+        smooth: fields of stiffness (`stiffness_modes` of a cloth or a solid of clusters) to fit with a smoothness
+            prior, by name, such as {"toy_stiffness": sb.Smooth()}. What `Smooth` leaves open, the size and the length
+            of the prior, is found from the recordings (`FitResult.fields`).
+        leave_one_out: also predict each recording without a held-out part by a fit to the other recordings.
+        profiles: follow the cost to both ends of every interval while all other parameters are fitted again; with more
+            than 60 parameters only for weak ones. False: linear intervals, which need no further simulation.
+        bootstrap: number of fits to data that are drawn at random from the given ones, with replacement; 0 for none.
+            With eight recordings or more, whole recordings are drawn, otherwise stretches of four autocorrelation
+            times. Each fit costs about two Jacobians. The spread of the results gives intervals that assume nothing
+            about the noise (`FitResult.bootstrap`).
+        beginnings: also fit the beginnings of the motions by themselves (`sheetbend.doubts.beginnings`). Where a
+            beginning contradicts the result, the search continues from there or the parameter is doubtful. This costs
+            about as much as the fit itself.
+        max_iterations: largest number of iterations, for each start and window.
+        threads: threads for experiments and columns of the Jacobian; the result does not depend on it.
+        progress: function that is called after every iteration.
+        journal: file that keeps every evaluation until the fit is done (see `sheetbend.minimum.journal`). If the
+            process is killed, the same call with the same file continues and gives the same bits. With another
+            recording, scene or version the file is refused.
+        executor: its workers compute experiments, raced starts, profiles, bootstraps and leave-one-out fits, for
+            example `concurrent.futures.ProcessPoolExecutor(2)`. The result has the same bits. Only this process writes
+            the journal.
 
     Returns:
-        Fit. On Ctrl-C it holds the best point so far, marked `interrupted`, with linear intervals: whatever needs a
-        refit is left out.
+        Fit. After Ctrl-C it holds the best point so far, marked `interrupted`, with linear intervals and without
+        anything that needs another fit.
 
     Raises:
-        InputError: anything inconsistent, named, before work starts.
-        SheetbendError: the start itself diverges or has no equilibrium.
+        InputError: inputs are inconsistent; the message names them. Raised before work starts.
+        SheetbendError: the simulation with the initial values diverges or has no equilibrium.
     """
     experiments = experiments_of(scene, recording, experiment)
     wanted, fields = with_fields(as_parameters(parameters, experiments), experiments, smooth or {})
