@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from .. import _core
 from ..arrays.checks import finite
-from ..errors import SceneError, SheetbendError
+from ..errors import SceneError, SheetbendError, refusal
 from ..scene.scene import Scene
 from .redundancy import warn_redundant
 from .simulate import forces_by_group, pressures_by_volume, start_of, whole
@@ -69,6 +69,7 @@ class Equilibrium:
 
     @property
     def positions(self) -> np.ndarray:
+        """(particles, 3) m."""
         return self.nodes[: self.scene.particle_count]
 
     def gradient(
@@ -155,9 +156,9 @@ def equilibrium(
         stable: leave saddles; False goes to the nearest equilibrium whatever its stability.
 
     Raises:
-        SceneError: the start has the wrong shape or leaves out hidden nodes that can move.
-        ValueError: air blows on triangles at the start; still air leaves a scene at rest as it is.
-        NoEquilibriumError: not converged; says how far it came and what to try.
+        SceneError: the start has the wrong shape or leaves out hidden nodes that can move, or the forces of the scene
+            have no energy, such as those of wind on triangles; still air leaves a scene at rest as it is.
+        NoEquilibriumError: the solver did not converge; the message says how far it came and what to try.
 
     Warns:
         RedundantConstraintsWarning: some rigid constraints follow from others at rest.
@@ -166,7 +167,10 @@ def equilibrium(
     theta = compiled.values(values)
     inputs = compiled.inputs(theta)
     x = None if start is None else whole_start(scene, start, inputs)
-    out = _core.equilibrium(compiled.core, inputs, x, stable)
+    try:
+        out = _core.equilibrium(compiled.core, inputs, x, stable)
+    except ValueError as error:
+        raise refusal(error, SceneError, scene.name) from error
     if not out.converged:
         raise no_rest(scene, out.message, scene.nodes if x is None else x.reshape(-1, 3))
     warn_redundant(scene.name, out.redundant)
@@ -195,10 +199,18 @@ def whole_start(scene: Scene, start: ArrayLike, inputs: np.ndarray, field: str =
 def equilibria(
     scene: Scene, starts: Iterable[ArrayLike], values: Mapping[str, float] | None = None, tolerance: float = 1e-6
 ) -> list[Equilibrium]:
-    """Find the distinct equilibria that several starts lead to, lowest energy first. Starts without one are left out.
+    """Find the distinct equilibria that several starts lead to, lowest energy first.
+
+    Starts that lead to no equilibrium are left out.
 
     Args:
-        tolerance: m; states nearer than this everywhere are one.
+        scene: is frozen by this.
+        starts: positions to start from, each (particles, 3) or (nodes, 3) m, see `equilibrium`.
+        values: quantities to change, by name.
+        tolerance: m; two states count as one if no particle is farther apart than this.
+
+    Raises:
+        SceneError: as `equilibrium`.
     """
     found: list[Equilibrium] = []
     for start in starts:

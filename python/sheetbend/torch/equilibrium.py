@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from .. import _core
+from ..errors import SceneError, refusal
 from ..motion.equilibrium import NoEquilibriumError, whole_start
 from ..motion.simulate import forces_by_group, pressures_by_volume
 from ..scene.scene import Scene
@@ -70,7 +71,10 @@ class Equilibria:
         self._scene.compiled.domain.check_inputs(inputs, replaced=self._replaced)
         # jacrev and jacfwd repeat one scene once per row or column.
         rows, scene_of = np.unique(inputs, axis=0, return_inverse=True)
-        distinct = _core.equilibria(self._scene.compiled.core, rows, self._start, self._stable, self._threads)
+        try:
+            distinct = _core.equilibria(self._scene.compiled.core, rows, self._start, self._stable, self._threads)
+        except ValueError as error:
+            raise refusal(error, SceneError, self._scene.name) from error
         for solution in distinct:
             if not solution.converged:
                 raise NoEquilibriumError(f"{self._scene.name}: {solution.message}")
@@ -102,7 +106,7 @@ def equilibrium(
         threads: for a batch; the result does not depend on it.
 
     Raises:
-        SceneError: the start has the wrong shape.
+        SceneError: the start has the wrong shape, or the forces of the scene have no energy.
         InputError: a tensor with an unknown name, of the wrong shape or dtype, on another device, not finite, or with a
             negative stiffness, mass or length; the message names the quantity and the scene of the batch.
         NoEquilibriumError: not converged; says how far it came and what to try.
