@@ -49,21 +49,25 @@ def fit_many(
 
     Intervals of shared parameters count each recording as one draw (the sandwich of Liang and Zeger 1986, Biometrika
     73, 13): residuals may be correlated within a recording in any way, and recordings may differ by more than their
-    noise. They are never narrower than independent residuals of the size that they have would make them. Left out is
-    what `sheetbend.fit` does besides: windows, starts, the limits of short substeps and fine meshes, premises, profiles
-    and doubts. Fit a few of the recordings with `sheetbend.fit` for these.
+    noise. They are at least as wide as those of independent residuals of the same size. `fit_many` has none of the
+    windows, starts, limits of short substeps and fine meshes, premises, profiles and doubts of `sheetbend.fit`: fit a
+    few of the recordings with `sheetbend.fit` for these.
 
     Args:
         experiments: at least `FEWEST`, each with a name of its own; those with `predict` are refused.
         parameters: as `sheetbend.fit` takes them.
-        max_iterations: steps.
-        progress: called after every step.
-        executor: shares out the recordings to its workers; the result has the same bits. Each worker holds all
-            recordings.
+        max_iterations: largest number of steps.
+        progress: function that is called after every step.
+        executor: its workers divide the recordings among themselves; the result has the same bits. Each worker holds
+            all recordings.
+
+    Returns:
+        ManyFit (`sheetbend.report.many`): the shared parameters with intervals, the private ones as a distribution, and
+        a row for each recording.
 
     Raises:
-        InputError: anything inconsistent, named, before work starts.
-        SheetbendError: a motion diverges at the start.
+        InputError: inputs are inconsistent; the message names them. Raised before work starts.
+        SheetbendError: a motion diverges with the initial values.
     """
     every = within(list(experiments))
     if len(every) < FEWEST:

@@ -82,6 +82,7 @@ class GradientReport:
 
     @property
     def passed(self) -> bool:
+        """Whether every row and the dot product pass."""
         return all(row.passed for row in self.rows) and self.dot_product <= DOT_PRODUCT_BOUND
 
     def to_dict(self) -> dict[str, Any]:

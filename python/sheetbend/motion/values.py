@@ -1,5 +1,5 @@
-"""What a scene's constraints are worth at given positions: strains and angles, elastic energy and its gradient, forces
-on supports."""
+"""The values of a scene's constraints at given positions: strains and angles, elastic energy and its gradient, forces
+of supports."""
 
 from __future__ import annotations
 
@@ -19,12 +19,16 @@ from .simulate import forces_by_group
 def constraint_values(
     scene: Scene, positions: ArrayLike | None = None, values: Mapping[str, float] | None = None
 ) -> dict[str, Array]:
-    """C of every constraint of a group, by group (count, rows), in the units of its kind.
+    """Evaluate the strain or angle C of every constraint.
 
     Args:
-        positions: (particles, 3) m, or (nodes, 3) m of all nodes, which it must be where hidden ones can move; the
-            scene's initial ones by default.
+        scene: is frozen by this.
+        positions: (particles, 3) m, or (nodes, 3) m of all nodes, which is needed where hidden nodes can move; the
+            scene's initial positions by default.
         values: quantities to change, by name.
+
+    Returns:
+        C by name of the group, (count, rows), in the unit of its kind.
 
     Raises:
         SceneError: wrong shapes or names.
@@ -41,12 +45,21 @@ def constraint_values(
 def elastic_energy(
     scene: Scene, positions: ArrayLike | None = None, values: Mapping[str, float] | None = None
 ) -> dict[str, Array]:
-    """C.C/(2 alpha) of every constraint of a group, J, by group (count,); zero where rigid or slack. Arguments: see
-    `constraint_values`.
+    """Compute the elastic energy C.C/(2 alpha) of every constraint, alpha being its compliance.
 
-    Not counted is what is in no group: (V - rest)^2/(2 compliance) of a volume that is kept (`Scene.add_volume`), and
-    -p V of a pressure (`Scene.add_pressure`). Nor is what two springs hold against each other where one of them has
-    slid (kinds with a `share`), share (1 - share) set.set/(2 alpha)."""
+    Energies that belong to no group are left out: (V - rest)^2/(2 compliance) of a volume that is kept
+    (`Scene.add_volume`), and -p V of a pressure (`Scene.add_pressure`). So is the energy share (1 - share)
+    set.set/(2 alpha) that two springs hold against each other after one of them has slid (kinds with a `share`).
+
+    Args:
+        scene, positions, values: as for `constraint_values`.
+
+    Returns:
+        J by name of the group, (count,); zero for constraints that are rigid or slack.
+
+    Raises:
+        SceneError: wrong shapes or names.
+    """
     compiled, energies = scene.compiled, {}
     C_of = constraint_values(scene, positions, values)
     for group, alpha in _compliances(scene, compiled.inputs(compiled.values(values))):
@@ -59,8 +72,8 @@ def elastic_energy(
 
 
 def elastic_energy_gradient(rest: Equilibrium) -> dict[str, float]:
-    """Derivative of the elastic energy of all groups at rest, alpha lambda.lambda/2, by every named quantity, J per
-    unit; that of a pressure, -p V, is not in it."""
+    """Differentiate the elastic energy of all groups at rest, alpha lambda.lambda/2, with respect to every named
+    quantity, in J per unit of the quantity. The energy -p V of a pressure is left out."""
     scene, compiled = rest.scene, rest.scene.compiled
     offset, size = compiled.layout["compliance"]
     own = {group.name: alpha for group, alpha in _compliances(scene, compiled.inputs(rest.theta))}
@@ -71,11 +84,17 @@ def elastic_energy_gradient(rest: Equilibrium) -> dict[str, float]:
 
 
 def support_forces(rest: Equilibrium) -> Array:
-    """(nodes, 3) N, the force of the supports on held nodes at rest, zero on free ones: of particles, and behind them
-    of hidden nodes such as the stub of a clamp, which carries a part of its moment.
+    """Compute the forces that supports exert on held nodes at rest.
 
-    They carry what constraints, kept volumes and given pressures put on held particles; not the weight of those, whose
-    masses are not used.
+    They balance the forces of constraints, kept volumes and given pressures on held nodes. The weight of held particles
+    is left out, because their masses are not used.
+
+    Args:
+        rest: as `equilibrium` returned it.
+
+    Returns:
+        (nodes, 3) N, zero for free nodes: particles first, then hidden nodes such as the stub of a clamp, which carries
+        a part of the clamp's moment.
     """
     scene, compiled = rest.scene, rest.scene.compiled
     inputs = compiled.inputs(rest.theta)
@@ -86,7 +105,7 @@ def support_forces(rest: Equilibrium) -> Array:
 
 
 def _pressure_forces(scene: Scene, inputs: Array, positions: Array) -> Array:
-    """(particles, 3) N, pressure times area of each triangle in air, a third to every corner."""
+    """(nodes, 3) N, pressure times area of each triangle in air, a third to every corner."""
     offset, size = scene.compiled.layout["pressure"]
     triangles = np.reshape(scene.air.triangles, (-1, 3)).astype(int)
     first, second, third = np.moveaxis(positions[triangles], 1, 0)

@@ -153,6 +153,7 @@ class Grip:
 
     @property
     def stays(self) -> bool:
+        """Whether the grip does not move."""
         return len(self.times) == 0
 
 

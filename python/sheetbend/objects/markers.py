@@ -23,11 +23,17 @@ from .solid import Solid, SolidSurface
 
 @dataclass(frozen=True)
 class Place:
-    """A material point: weights on up to eight particles (on up to four with an offset), weights of its tangent, and
-    an offset in the frame (t, n, t x n), or a point of a rigid body.
+    """A material point, such as that of a marker: a weighted sum of particles, with or without an offset, or a point of
+    a rigid body.
 
-    t is the rope's direction there, n the given normal made perpendicular to it. On a `body` the offset counts along
-    the axes of the body's frame, and the particles are the body's nodes.
+    Attributes:
+        particles: up to eight, with an offset up to four; of a rigid body its four nodes.
+        weights: of the particles in the point's position.
+        tangent: of the particles in the rope's direction t there, which may have any length.
+        offset: (3,) m along t, n and t x n, n being `normal` made perpendicular to t; on a body along the axes of its
+            frame. None for no offset.
+        normal: (3,) of unit length.
+        body: the rigid body that the point belongs to, or None.
     """
 
     particles: tuple[int, ...]
@@ -125,7 +131,13 @@ def on_rope(rope: Rope, arc_length: float, interpolation: str = "cubic") -> Plac
 
 
 def along_rope(rope: Rope, count: int, interpolation: str = "cubic") -> tuple[Place, ...]:
-    """`count` markers at equal arc lengths from end to end."""
+    """Markers at equal distances along a rope, the first and the last on its ends.
+
+    Args:
+        rope: as `add_rope` returned it.
+        count: number of markers.
+        interpolation: as of `on_rope`.
+    """
     _check_rope(rope)
     return tuple(on_rope(rope, s, interpolation) for s in np.linspace(0.0, rope.length, count))
 

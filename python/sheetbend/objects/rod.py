@@ -31,8 +31,13 @@ HOLD = 1e-4
 
 @dataclass(frozen=True)
 class Rod(Rope):
-    """A rope with material frames: `directors` are those of its edges, with the grips' own first and last; so are
-    `normals`, those of sections that shear. Both are hidden nodes, whose numbers index `Trajectory.nodes`."""
+    """A rope with material frames, in a scene. Its attributes are those of a `Rope`, and two more.
+
+    Attributes:
+        directors: the first axes of the frames of its links, with those of the grips first and last: hidden nodes,
+            whose numbers index `Trajectory.nodes`.
+        normals: likewise, the normals of its sections; empty where sections do not shear.
+    """
 
     directors: Array = field(default_factory=lambda: np.zeros(0, dtype=int))
     normals: Array = field(default_factory=lambda: np.zeros(0, dtype=int))

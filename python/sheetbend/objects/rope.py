@@ -36,8 +36,15 @@ GHOST = 0.01  # length of a clamp's ghost link over a rope's link; only its dire
 
 @dataclass(frozen=True)
 class Rope:
-    """A rope in a scene: particles in order, material coordinates [m], and the ghosts that give clamps a direction,
-    hidden nodes whose numbers index `Trajectory.nodes`."""
+    """A rope in a scene.
+
+    Attributes:
+        name: quantities are called `<name>_...`.
+        particles: (n,) their numbers, in order from the start of the rope to its end.
+        arc_length: (n,) m, how far each particle is from the start along the rope at rest.
+        start_ghost, end_ghost: hidden nodes that give a clamped end its direction, whose numbers index
+            `Trajectory.nodes`; None where the end is not clamped.
+    """
 
     name: str
     particles: Array
@@ -47,6 +54,7 @@ class Rope:
 
     @property
     def length(self) -> float:
+        """m, at rest."""
         return float(self.arc_length[-1])
 
 

@@ -56,7 +56,8 @@ class Recording(MarkerData):
         and metadata (`sheetbend.recording.io.sidecar`).
 
         Args:
-            path: an .npz, .csv, .c3d or .pkl file, or a folder of OBJ or PLY files, a frame each.
+            path: an .npz, .npy, .csv, .tsv, .txt, .c3d, .trc or .pkl file, or a folder of OBJ or PLY files with one
+                frame each; docs/recordings.md describes them.
             units: length unit of the file, "m", "cm" or "mm"; None takes the JSON's, and meters without one.
 
         Raises:
