@@ -15,6 +15,7 @@ from ..errors import SceneError
 from ..mesh import TriangleMesh
 from ..quantities.quantities import Term
 from ..scene.scene import Array, Scene
+from .cloth_cut import Bending, Cut
 from .elastic_group import add_elastic_group
 from .flat_size import FlatSize
 from .hinges import Hinges
@@ -181,17 +182,7 @@ def add_cloth(
     named = {"poisson": poisson, "law": law or Linear(), "bending_model": bending_model, "yield_share": yield_share}
     numbers = needed | optional | named
     _check_cut(scene, name, fabric, numbers)
-    if not (is_number(poisson) and -1 < poisson < 1):
-        raise SceneError(f"{name}.poisson", "must lie between -1 and 1", poisson, "give sqrt(nu_uv nu_vu)")
-    if bending_model not in MODELS:
-        raise SceneError(f"{name}.bending_model", "is unknown", bending_model, f"use one of: {', '.join(MODELS)}")
-    if bend_damping is not None and bending is None:
-        raise SceneError(f"{name}.bend_damping", "needs bending", bend_damping, "give bending, or leave it out")
-    of_curvature = {"bending_weft": bending_weft, "bending_twist": bending_twist, "yield_curvature": yield_curvature}
-    for field, value in of_curvature.items():
-        if value is not None and (bending is None or bending_model != "curvature"):
-            fix = "give bending and keep bending_model = 'curvature', or leave it out"
-            raise SceneError(f"{name}.{field}", "belongs to the curvature model", value, fix)
+    _check_together(name, numbers)
     shape = (
         mesh.vertices if positions is None else finite(f"{name}.positions", positions, mesh.vertices.shape, SceneError)
     )
@@ -201,22 +192,18 @@ def add_cloth(
 
     particles = scene.add_particles(shape, 0.0)
     size = FlatSize.add(scene, mesh, name, warp_size, weft_size, None if bending is None else bending_model)
-    _weigh(scene, mesh, fabric, particles, density, drag_linear, drag_quadratic, size)
-    stiffness = (warp, weft, shear, poisson)
+    cut = Cut(scene, mesh, name, fabric, particles, size)
+    _weigh(cut, density, drag_linear, drag_quadratic)
     kept = np.flatnonzero(free[mesh.triangles].any(axis=1))
     varying = None
     if stiffness_modes:
         varying = field_of_triangles(scene, mesh, name, f"{fabric}_warp", stiffness_modes, kept)
-    _membrane(scene, mesh, name, fabric, particles, kept, stiffness, law or Linear(), membrane_damping, size, varying)
+    _membrane(cut, kept, (warp, weft, shear, poisson), law or Linear(), membrane_damping, varying)
     if bending is not None:
-        if bending_model == "curvature":
-            sheet = SheetCurvature(mesh, free)
-            yields = None if yield_curvature is None or yield_share is None else (yield_curvature, yield_share)
-            sheet.add(
-                scene, name, fabric, particles, bending, bending_weft, bending_twist, curved, bend_damping, yields, size
-            )
-        else:
-            Hinges(mesh, free).add(scene, name, fabric, particles, bending, bending_model, curved, bend_damping)
+        yields = None if yield_curvature is None or yield_share is None else (yield_curvature, yield_share)
+        bends = Bending(bending, bending_model, bending_weft, bending_twist, curved, bend_damping, yields)
+        sheet: SheetCurvature | Hinges = SheetCurvature(mesh, free) if bends.of_curvature else Hinges(mesh, free)
+        sheet.add(cut, bends)
     built = Cloth(name, mesh, particles, fabric, numbers, {"warp_size": warp_size, "weft_size": weft_size}, varying)
     scene.cloths[name] = built
     return built
@@ -233,40 +220,54 @@ def _check_cut(scene: Scene, name: str, fabric: str, numbers: Mapping[str, Any])
             )
 
 
-def _weigh(
-    scene: Scene,
-    mesh: TriangleMesh,
-    fabric: str,
-    particles: Array,
-    density: float,
-    linear: float | None,
-    quadratic: float | None,
-    size: FlatSize,
-) -> None:
+def _check_together(name: str, numbers: Mapping[str, Any]) -> None:
+    """Refuse numbers of a fabric that are out of range or do not go with others."""
+    poisson, model, bending = numbers["poisson"], numbers["bending_model"], numbers["bending"]
+    if not (is_number(poisson) and -1 < poisson < 1):
+        raise SceneError(f"{name}.poisson", "must lie between -1 and 1", poisson, "give sqrt(nu_uv nu_vu)")
+    if model not in MODELS:
+        raise SceneError(f"{name}.bending_model", "is unknown", model, f"use one of: {', '.join(MODELS)}")
+    damping = numbers["bend_damping"]
+    if damping is not None and bending is None:
+        raise SceneError(f"{name}.bend_damping", "needs bending", damping, "give bending, or leave it out")
+    for field in ("bending_weft", "bending_twist", "yield_curvature"):
+        if numbers[field] is not None and (bending is None or model != "curvature"):
+            fix = "give bending and keep bending_model = 'curvature', or leave it out"
+            raise SceneError(f"{name}.{field}", "belongs to the curvature model", numbers[field], fix)
+
+
+def _weigh(cut: Cut, density: float, linear: float | None, quadratic: float | None) -> None:
     """Masses and drag: every vertex has a third of its triangles."""
+    scene, mesh, fabric = cut.scene, cut.mesh, cut.fabric
     share = np.bincount(mesh.triangles.ravel(), np.repeat(mesh.areas / 3.0, 3), len(mesh.vertices))
+    area = cut.size.power(1, 1)
     scene.add_quantity(f"{fabric}_density", density, "kg/m^2", shared=True)
-    scene.add_terms([Term("mass", particles, share, ((f"{fabric}_density", "identity"), *size.power(1, 1)))])
+    scene.add_terms([Term("mass", cut.particles, share, ((f"{fabric}_density", "identity"), *area))])
     for kind, value, unit in (("linear", linear, "N s/m^3"), ("quadratic", quadratic, "N s^2/m^4")):
         if value is not None:
             scene.has_drag = True
             quantity = scene.add_quantity(f"{fabric}_drag_{kind}", value, unit, shared=True)
-            scene.add_terms([Term(f"drag_{kind}", particles, share, ((quantity, "identity"), *size.power(1, 1)))])
+            scene.add_terms([Term(f"drag_{kind}", cut.particles, share, ((quantity, "identity"), *area))])
 
 
 def _membrane(
-    scene: Scene,
-    mesh: TriangleMesh,
-    name: str,
-    fabric: str,
-    particles: Array,
+    cut: Cut,
     kept: Array,
     stiffness: tuple[float, float | None, float, float],
     law: Law,
     damping: float | None,
-    size: FlatSize,
     field: StiffnessField | None,
 ) -> None:
+    """Tension and shear of the triangles that can move.
+
+    Args:
+        kept: (count,) those triangles.
+        stiffness: warp, weft and shear, N/m, and Poisson's number; weft = warp where it is None.
+        law: how tension grows with strain.
+        damping: Kelvin-Voigt time constant, s.
+        field: how the stiffness varies from triangle to triangle.
+    """
+    scene, mesh, name, fabric, size = cut.scene, cut.mesh, cut.name, cut.fabric, cut.size
     warp, weft, shear, poisson = stiffness
     corners, areas = mesh.corners[kept], mesh.areas[kept]
     count = len(kept)
@@ -278,7 +279,7 @@ def _membrane(
     values = add_elastic_group(
         scene,
         law.kind,
-        particles[mesh.triangles[kept]],
+        cut.particles[mesh.triangles[kept]],
         name=f"{name}_membrane",
         rest=rest,
         scale=areas,

@@ -6,7 +6,8 @@ import numpy as np
 
 from ..errors import SceneError
 from ..mesh import TriangleMesh
-from ..scene.scene import Array, Scene
+from ..scene.scene import Array
+from .cloth_cut import Bending, Cut
 from .elastic_group import add_elastic_group
 
 
@@ -44,44 +45,35 @@ class Hinges:
         k = np.stack([at_0[0] + at_0[1], -at_0[0] - at_1[0], -at_0[1] - at_1[1]], axis=1)
         return k / np.sqrt(self.area)[:, None]
 
-    def add(
-        self,
-        scene: Scene,
-        name: str,
-        fabric: str,
-        particles: Array,
-        rigidity: float,
-        model: str,
-        curved: bool,
-        damping: float | None,
-    ) -> None:
-        """Add them to a scene as the group `<name>_bend`, with the quantity `<fabric>_bending` (B, N m).
+    def add(self, cut: Cut, bending: Bending) -> None:
+        """Add them to the cut's scene as the group `<name>_bend`, with the quantity `<fabric>_bending` (B, N m).
 
         Raises:
             SceneError: a mesh with one-way diagonals, or a curved rest shape of quadratic bending.
         """
         if self.mesh.one_way_diagonals:
             why = f"bend {self.mesh.diagonal_bias:.1f} times as hard in one direction as in another on this mesh"
-            raise SceneError(f"{name}.bending", why, rigidity, "use the curvature model, or an equilateral mesh")
-        dihedral = model == "dihedral"
-        if curved and not dihedral:
+            fix = "use the curvature model, or an equilateral mesh"
+            raise SceneError(f"{cut.name}.bending", why, bending.rigidity, fix)
+        dihedral = bending.model == "dihedral"
+        if bending.curved and not dihedral:
             fix = "use the dihedral model"
-            raise SceneError(f"{name}.curved", "is not possible for quadratic bending, flat at rest", True, fix)
+            raise SceneError(f"{cut.name}.curved", "is not possible for quadratic bending, flat at rest", True, fix)
         count = len(self.stencils)
         if dihedral:
             scale = self.length**2 / self.area
-            rest = rest_angles(self.mesh, self.stencils) if curved else np.zeros(count)
+            rest = rest_angles(self.mesh, self.stencils) if bending.curved else np.zeros(count)
         else:
             scale, rest = np.ones(count), self._cotangents()
         add_elastic_group(
-            scene,
-            model,
-            particles[self.stencils],
-            name=f"{name}_bend",
+            cut.scene,
+            bending.model,
+            cut.particles[self.stencils],
+            name=f"{cut.name}_bend",
             rest=rest,
             scale=scale,
-            stiffness=(f"{fabric}_bending", rigidity, "N m"),
-            damping=(f"{fabric}_bend_damping", damping),
+            stiffness=(f"{cut.fabric}_bending", bending.rigidity, "N m"),
+            damping=(f"{cut.fabric}_bend_damping", bending.damping),
         )
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from ..errors import SceneError
 from ..mesh import TriangleMesh
 from ..quantities.quantities import Term
-from ..scene.scene import Array, Scene
+from ..scene.scene import Array
+from .cloth_cut import Bending, Cut
 from .elastic_group import add_elastic_group
-from .flat_size import AS_MESH, FlatSize
 from .hinges import rest_angles
 
 IRREGULAR = 0.2  # share of inner vertices without six neighbors above which a user is told
@@ -59,27 +59,14 @@ class SheetCurvature:
         self.matrix = _curvature_matrix(corners, _unfolded(mesh, hinge, side, corners))[kept]
         self.angles = rest_angles(mesh, mesh.hinges)[hinge][kept]
 
-    def add(
-        self,
-        scene: Scene,
-        name: str,
-        fabric: str,
-        particles: Array,
-        rigidity: float,
-        weft: float | None,
-        twist: float | None,
-        curved: bool,
-        damping: float | None,
-        yields: tuple[float, float] | None,
-        size: FlatSize = AS_MESH,
-    ) -> None:
-        """Add them to a scene as the group `<name>_bend`, with the quantities `<fabric>_bending`, where given
-        `_bending_weft`, `_bending_twist`, N m, and of what yields `<fabric>_yield_curvature`, 1/m, and `_yield_share`.
+    def add(self, cut: Cut, bends: Bending) -> None:
+        """Add them to the cut's scene as the group `<name>_bend`.
 
-        Args:
-            yields: the yield curvature and the share; each triangle then has a set, a hidden node, zero at first.
-            size: of the flat cloth; angles at rest are kept.
+        The quantities are `<fabric>_bending`, where given `_bending_weft` and `_bending_twist`, N m, and of what yields
+        `<fabric>_yield_curvature`, 1/m, and `_yield_share`. Each triangle that yields has a set, a hidden node, zero at
+        first. Another size of the flat cloth leaves angles at rest as they are.
         """
+        scene, name, fabric, yields = cut.scene, cut.name, cut.fabric, bends.yields
         irregular = _irregular(self.mesh)
         if irregular > IRREGULAR:
             warnings.warn(f"{name}: {irregular:.0%} {WEAKER}", UserWarning, stacklevel=3)
@@ -87,14 +74,14 @@ class SheetCurvature:
         rest = np.zeros((count, 14 if yields is None else 16))
         rest[:, :9] = self.matrix.reshape(count, 9)
         rest[:, 9:11] = (1.0, np.sqrt(2.0))
-        if curved:
+        if bends.curved:
             rest[:, 11:14] = self.angles
         bending = f"{fabric}_bending"
-        ratios = [(9, weft, f"{bending}_weft", 1.0), (10, twist, f"{bending}_twist", np.sqrt(2.0))]
+        ratios = [(9, bends.weft, f"{bending}_weft", 1.0), (10, bends.twist, f"{bending}_twist", np.sqrt(2.0))]
         for place, value, _, _ in ratios:
             if value is not None:
                 rest[:, place] = 0.0
-        kind, stencils = "sheet_curvature", particles[self.stencils]
+        kind, stencils = "sheet_curvature", cut.particles[self.stencils]
         if yields is not None:
             kind = "yielding_sheet_curvature"
             stencils = np.column_stack([stencils, scene.add_hidden(np.zeros((count, 3)), 1.0, pinned=True)])
@@ -106,11 +93,11 @@ class SheetCurvature:
             name=f"{name}_bend",
             rest=rest,
             scale=self.area,
-            stiffness=(bending, rigidity, "N m"),
-            damping=(f"{fabric}_bend_damping", damping),
-            size=size,
+            stiffness=(bending, bends.rigidity, "N m"),
+            damping=(f"{fabric}_bend_damping", bends.damping),
+            size=cut.size,
         )
-        size.curvatures(scene, f"{name}_bend", values, self.corners)
+        cut.size.curvatures(scene, f"{name}_bend", values, self.corners)
         for place, value, label, factor in ratios:
             if value is not None:
                 scene.add_quantity(label, value, "N m", shared=True)
