@@ -33,7 +33,8 @@ from .minimum.smooth import Smooth
 from .motion.balance import ForceBalance, force_balance
 from .motion.contact_counts import ContactCounts, ContactMode
 from .motion.equilibrium import Equilibrium, NoEquilibriumError, equilibria, equilibrium
-from .motion.gradients import GradientReport, check_gradients
+from .motion.gradient_report import GradientReport
+from .motion.gradients import check_gradients
 from .motion.redundancy import RedundantConstraintsWarning
 from .motion.rollout import Gradient, Rollout, rollout
 from .motion.simulate import Trajectory, simulate

@@ -17,7 +17,7 @@ import pytest
 import sheetbend as sb
 from commands import last_line, run
 from sheetbend import cli
-from sheetbend.motion.gradients import GradientReport, GradientRow
+from sheetbend.motion.gradient_report import GradientReport, GradientRow
 
 ROPE = """\
 [experiment]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.mesh import icosphere
-from sheetbend.motion.gradients import GradientReport
+from sheetbend.motion.gradient_report import GradientReport
 from sheetbend.scene.compiled import CompiledScene
 
 SOLVER = sb.Solver(h=1 / 400, method="gauss_seidel")

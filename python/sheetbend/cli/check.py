@@ -21,7 +21,8 @@ from ..gripped.windows import SPANS
 from ..minimum.growth import in_words, over_fit
 from ..minimum.jacobian_check import JacobianReport, check_jacobian
 from ..minimum.problem import FitProblem
-from ..motion.gradients import GradientReport, check_gradients
+from ..motion.gradient_report import GradientReport
+from ..motion.gradients import check_gradients
 from ..motion.solver import Solver
 from ..objects.chain import unit_vector
 from ..quantities.parameters import Parameters

@@ -20,12 +20,11 @@ from ..errors import InputError
 from ..scene.compiled import CompiledScene
 from ..scene.scene import Scene
 from .gradient_probe import DIFFERENCES_BOUND, JITTERS, LOUD, Probe, jittered
+from .gradient_report import COMPLEX_STEP_BOUND, GradientReport, GradientRow
 from .simulate import divergence, substeps
 from .solver import Solver
 from .tape import budget
 
-COMPLEX_STEP_BOUND = 1e-8
-DOT_PRODUCT_BOUND = 1e-9
 RUNS = 6.0  # of the scene for differences along one direction, mostly
 SHORTER = (1.0, 0.5, 0.25, 0.125)
 POSITIVE = (
@@ -33,110 +32,6 @@ POSITIVE = (
     *("volume", "volume_compliance", "friction", "contact_radius", "contact_stiffness", "collider_size", "restitution"),
     "contact_dissipation",
 )
-
-
-@dataclass(frozen=True)
-class GradientRow:
-    """One gradient against its references; errors are relative to the largest entry of the reference.
-
-    Attributes:
-        name: a named quantity, or an input array such as "position".
-        size: entries; entries tested (large arrays are sampled).
-        gradient: its largest absolute entry.
-        complex_step: error against complex step through the templated solver.
-        differences: error against central differences, whose own accuracy limits it.
-        passed: complex step within its bound, differences within theirs, or within their noise; or nothing is felt.
-        rounding: what complex step and adjoint may differ by for rounding, likewise relative.
-        noise: what differences may be off by for their own error (infinite where none could be taken).
-        unfelt: moving any tested entry by its own size changes the loss by less than rounding does, by the adjoint and
-            by complex step; relative errors of such a gradient mean nothing.
-    """
-
-    name: str
-    size: int
-    gradient: float
-    complex_step: float
-    differences: float
-    passed: bool
-    unfelt: bool = False
-    noise: float = 0.0
-    rounding: float = 0.0
-
-
-@dataclass(frozen=True)
-class GradientReport:
-    """The result of `check_gradients`.
-
-    Attributes:
-        scene, steps: its name, and the substeps of the stretch.
-        rows: one per quantity and array.
-        dot_product: relative gap of <J v, w> = <v, J^T w> for random v, w.
-        sampled: what was left out to keep to a time limit, in words; empty where nothing was.
-    """
-
-    scene: str
-    steps: int
-    rows: tuple[GradientRow, ...]
-    dot_product: float
-    sampled: str = ""
-
-    @property
-    def passed(self) -> bool:
-        """Whether every row and the dot product pass."""
-        return all(row.passed for row in self.rows) and self.dot_product <= DOT_PRODUCT_BOUND
-
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON: each gradient by name with its relative errors and pass or fail."""
-        gradients = {
-            r.name: {
-                "size": r.size,
-                "gradient": r.gradient,
-                "complex_step": r.complex_step,
-                "differences": r.differences,
-                "rounding": r.rounding,
-                "noise": r.noise if math.isfinite(r.noise) else None,
-                "passed": r.passed,
-                "unfelt": r.unfelt,
-            }
-            for r in self.rows
-        }
-        return {
-            "scene": self.scene,
-            "steps": self.steps,
-            "gradients": gradients,
-            "dot_product": self.dot_product,
-            "sampled": self.sampled,
-            "passed": self.passed,
-        }
-
-    def __str__(self) -> str:
-        lines = [
-            f"Gradient check of '{self.scene}' over {self.steps} substeps: {'passed' if self.passed else 'FAILED'}"
-        ]
-        if self.sampled:
-            lines.append(f"  {self.sampled}")
-        width = max(len(r.name) for r in self.rows)
-        lines.append(f"  {'':{width}}  {'entries':>7}  {'largest':>9}  {'complex step':>12}  {'differences':>11}")
-        for r in self.rows:
-            mark = "  nothing felt beyond rounding" if r.unfelt else _noisy(r) if r.passed else "  <- fails"
-            lines.append(
-                f"  {r.name:{width}}  {r.size:7d}  {r.gradient:9.2e}"
-                f"  {r.complex_step:12.1e}  {r.differences:11.1e}{mark}"
-            )
-        lines.append(f"  dot product <Jv, w> = <v, J'w>: {self.dot_product:.1e}")
-        lines.append(
-            f"  bounds: complex step {COMPLEX_STEP_BOUND:g}, differences {DIFFERENCES_BOUND:g},"
-            f" dot product {DOT_PRODUCT_BOUND:g}"
-        )
-        return "\n".join(lines)
-
-
-def _noisy(row: GradientRow) -> str:
-    """Which path cannot be judged down to its bound, and down to what it can."""
-    words = [f"complex step good to {row.rounding:.0e}"] if row.rounding > COMPLEX_STEP_BOUND else []
-    if row.noise > DIFFERENCES_BOUND:
-        words.append(f"differences good to {row.noise:.0e}" if math.isfinite(row.noise) else "no differences")
-    return "".join(f"  {part}" for part in words)
 
 
 def check_gradients(
@@ -185,30 +80,19 @@ def check_gradients(
         weights = rng.standard_normal((len(steps), compiled.core.dofs))
         adjoint = core.vjp(inputs, tape, steps, weights, 0.0)
         probe = Probe(core, inputs, steps, weights, adjoint)
-        jitter = _jitter(core, inputs, steps, weights, adjoint, solver, np.random.default_rng(seed + 1))
-        rows = [
-            _quantity_row(compiled, probe, theta, adjoint, jitter, name, scene.quantities[name].positive)
-            for name in compiled.names
-        ]
-        rows += [_array_row(compiled, probe, adjoint, jitter, name, samples, rng) for name in _present(compiled)]
-        dot = _dot_product(core, inputs, steps, weights, adjoint, rng)
+        checked = _Checked(compiled, probe, adjoint, _jitter(probe, adjoint, solver, np.random.default_rng(seed + 1)))
+        rows = [checked.quantity(theta, name, scene.quantities[name].positive) for name in compiled.names]
+        rows += [checked.array(name, samples, rng) for name in _present(compiled)]
+        dot = checked.dot_product(rng)
     return GradientReport(scene.name, steps[-1], tuple(rows), dot, sampled)
 
 
-def _jitter(
-    core: Any,
-    inputs: np.ndarray,
-    steps: Sequence[int],
-    weights: np.ndarray,
-    adjoint: np.ndarray,
-    solver: Solver,
-    rng: np.random.Generator,
-) -> np.ndarray:
+def _jitter(probe: Probe, adjoint: np.ndarray, solver: Solver, rng: np.random.Generator) -> np.ndarray:
     """(JITTERS, inputs) by how much the adjoint moves when the last digits of the inputs do."""
-    moved = []
+    core, steps, moved = probe.core, probe.steps, []
     for _ in range(JITTERS):
-        x = jittered(inputs, rng)
-        moved.append(core.vjp(x, core.record(x, steps, 0.0, solver.budget)[1], steps, weights, 0.0) - adjoint)
+        x = jittered(probe.inputs, rng)
+        moved.append(core.vjp(x, core.record(x, steps, 0.0, solver.budget)[1], steps, probe.weights, 0.0) - adjoint)
     return np.array(moved)
 
 
@@ -249,83 +133,87 @@ class _Entry:
     rounding: float
 
 
-def _quantity_row(
-    compiled: CompiledScene,
-    probe: Probe,
-    theta: np.ndarray,
-    adjoint: np.ndarray,
-    jitter: np.ndarray,
-    name: str,
-    positive: bool,
-) -> GradientRow:
-    direction = np.zeros(len(theta))
-    direction[compiled.names.index(name)] = 1.0
-    gradient = float(compiled.theta_bar(theta, adjoint) @ direction)
-    along = compiled.inputs_dot(theta, direction)
-    exact = probe.complex_step(along)
-    size = probe.size(float(theta @ direction), 1e-2, positive, exact)
-    moved = _rounding(probe, along, jitter @ along, gradient, exact, abs(gradient))
-    found = probe.differences(along, 1e-4 * size, exact)
-    return _row(name, 1, [_Entry(gradient, exact, *found, probe.rounding / size, moved)])
+@dataclass(frozen=True)
+class _Checked:
+    """An adjoint beside the paths that it is checked against.
 
+    Attributes:
+        probe: the two independent paths.
+        adjoint: (inputs,) the gradient that is checked.
+        jitter: (JITTERS, inputs) by how much it moves when the last digits of the inputs do.
+    """
 
-def _array_row(
-    compiled: CompiledScene,
-    probe: Probe,
-    adjoint: np.ndarray,
-    jitter: np.ndarray,
-    name: str,
-    samples: int,
-    rng: np.random.Generator,
-) -> GradientRow:
-    offset, size = compiled.layout[name]
-    part, own = adjoint[offset : offset + size], probe.inputs[offset : offset + size]
-    if samples == 0:
-        return _row(name, size, [_all_at_once(probe, part, jitter, own, offset, name in POSITIVE, rng)])
-    largest = np.argsort(-np.abs(part))[: samples // 2]
-    tested = np.unique(np.concatenate([largest, rng.choice(size, min(size, samples - len(largest)), replace=False)]))
-    entries = []
-    for i in tested:
-        direction = np.zeros(len(adjoint))
-        direction[offset + i] = 1.0
+    compiled: CompiledScene
+    probe: Probe
+    adjoint: np.ndarray
+    jitter: np.ndarray
+
+    def quantity(self, theta: np.ndarray, name: str, positive: bool) -> GradientRow:
+        """The row of a named quantity, at the values theta."""
+        probe, direction = self.probe, np.zeros(len(theta))
+        direction[self.compiled.names.index(name)] = 1.0
+        gradient = float(self.compiled.theta_bar(theta, self.adjoint) @ direction)
+        along = self.compiled.inputs_dot(theta, direction)
+        exact = probe.complex_step(along)
+        size = probe.size(float(theta @ direction), 1e-2, positive, exact)
+        moved = self._rounding(along, self.jitter @ along, gradient, exact, abs(gradient))
+        found = probe.differences(along, 1e-4 * size, exact)
+        return _row(name, 1, [_Entry(gradient, exact, *found, probe.rounding / size, moved)])
+
+    def array(self, name: str, samples: int, rng: np.random.Generator) -> GradientRow:
+        """The row of an input array: the largest entries of its gradient and random ones, or all entries at once where
+        there are no samples."""
+        probe = self.probe
+        offset, size = self.compiled.layout[name]
+        part, own = self.adjoint[offset : offset + size], probe.inputs[offset : offset + size]
+        if samples == 0:
+            return _row(name, size, [self._all_at_once(part, own, offset, name in POSITIVE, rng)])
+        largest = np.argsort(-np.abs(part))[: samples // 2]
+        random = rng.choice(size, min(size, samples - len(largest)), replace=False)
+        entries = []
+        for i in np.unique(np.concatenate([largest, random])):
+            direction = np.zeros(len(self.adjoint))
+            direction[offset + i] = 1.0
+            exact = probe.complex_step(direction)
+            size_of = probe.size(float(own[i]), 1e-3, name in POSITIVE, exact)
+            found = probe.differences(direction, 1e-4 * size_of, exact)
+            of_array = float(np.abs(part).max())
+            moved = self._rounding(direction, self.jitter[:, offset + i], float(part[i]), exact, of_array)
+            entries.append(_Entry(float(part[i]), exact, *found, probe.rounding / size_of, moved))
+        return _row(name, size, entries)
+
+    def dot_product(self, rng: np.random.Generator) -> float:
+        """<J v, w> by tangents against <v, J^T w> by the adjoint, relative to the size of its terms."""
+        probe = self.probe
+        v = rng.standard_normal(len(probe.inputs)) * np.maximum(np.abs(probe.inputs), 1e-3)
+        _, x_dot = probe.core.jvp(probe.inputs, v[None], probe.steps, 0.0)
+        forward, backward = float((x_dot[0] * probe.weights).sum()), float(v @ self.adjoint)
+        return abs(forward - backward) / max(float(np.abs(v * self.adjoint).sum()), 1e-300)
+
+    def _all_at_once(
+        self, part: np.ndarray, own: np.ndarray, offset: int, positive: bool, rng: np.random.Generator
+    ) -> _Entry:
+        """The derivative along one direction in which every entry of an array counts, by its own size and in the sense
+        of its gradient, so that nothing cancels."""
+        probe = self.probe
+        sizes = np.array([probe.size(float(v), 1e-3, positive, float(g)) for v, g in zip(own, part, strict=True)])
+        direction = np.zeros(len(probe.inputs))
+        mine = sizes * np.where(part < 0, -1.0, 1.0) * rng.uniform(0.5, 1.0, len(part))
+        direction[offset : offset + len(part)] = mine
         exact = probe.complex_step(direction)
-        size_of = probe.size(float(own[i]), 1e-3, name in POSITIVE, exact)
-        found = probe.differences(direction, 1e-4 * size_of, exact)
-        moved = _rounding(probe, direction, jitter[:, offset + i], float(part[i]), exact, float(np.abs(part).max()))
-        entries.append(_Entry(float(part[i]), exact, *found, probe.rounding / size_of, moved))
-    return _row(name, size, entries)
+        gradient = float(part @ mine)
+        moved = self._rounding(direction, self.jitter @ direction, gradient, exact, abs(gradient))
+        return _Entry(gradient, exact, *probe.differences(direction, 1e-4, exact), probe.rounding, moved)
 
-
-def _all_at_once(
-    probe: Probe,
-    part: np.ndarray,
-    jitter: np.ndarray,
-    own: np.ndarray,
-    offset: int,
-    positive: bool,
-    rng: np.random.Generator,
-) -> _Entry:
-    """The derivative along one direction in which every entry of an array counts, by its own size and in the sense of
-    its gradient, so that nothing cancels."""
-    sizes = np.array([probe.size(float(v), 1e-3, positive, float(g)) for v, g in zip(own, part, strict=True)])
-    direction = np.zeros(len(probe.inputs))
-    mine = sizes * np.where(part < 0, -1.0, 1.0) * rng.uniform(0.5, 1.0, len(part))
-    direction[offset : offset + len(part)] = mine
-    exact = probe.complex_step(direction)
-    gradient = float(part @ mine)
-    moved = _rounding(probe, direction, jitter @ direction, gradient, exact, abs(gradient))
-    return _Entry(gradient, exact, *probe.differences(direction, 1e-4, exact), probe.rounding, moved)
-
-
-def _rounding(
-    probe: Probe, direction: np.ndarray, jitter: np.ndarray, gradient: float, exact: float, scale: float
-) -> float:
-    """What rounding may make of the gap between adjoint and complex step; the noise of the latter, which costs runs,
-    only where it matters."""
-    noise = LOUD * float(np.abs(jitter).max())
-    if abs(gradient - exact) <= COMPLEX_STEP_BOUND * scale + noise:
-        return noise
-    return noise + LOUD * probe.noise(direction, exact)
+    def _rounding(
+        self, direction: np.ndarray, jitter: np.ndarray, gradient: float, exact: float, scale: float
+    ) -> float:
+        """What rounding may make of the gap between adjoint and complex step; the noise of the latter, which costs
+        runs, only where it matters."""
+        noise = LOUD * float(np.abs(jitter).max())
+        if abs(gradient - exact) <= COMPLEX_STEP_BOUND * scale + noise:
+            return noise
+        return noise + LOUD * self.probe.noise(direction, exact)
 
 
 def _row(name: str, size: int, entries: Sequence[_Entry]) -> GradientRow:
@@ -348,18 +236,3 @@ def _row(name: str, size: int, entries: Sequence[_Entry]) -> GradientRow:
 
 def _present(compiled: CompiledScene) -> list[str]:
     return [name for name, (_, size) in compiled.layout.items() if size > 0]
-
-
-def _dot_product(
-    core: Any,
-    inputs: np.ndarray,
-    steps: Sequence[int],
-    weights: np.ndarray,
-    adjoint: np.ndarray,
-    rng: np.random.Generator,
-) -> float:
-    """<J v, w> by tangents against <v, J^T w> by the adjoint, relative to the size of its terms."""
-    v = rng.standard_normal(len(inputs)) * np.maximum(np.abs(inputs), 1e-3)
-    _, x_dot = core.jvp(inputs, v[None], steps, 0.0)
-    forward, backward = float((x_dot[0] * weights).sum()), float(v @ adjoint)
-    return abs(forward - backward) / max(float(np.abs(v * adjoint).sum()), 1e-300)
