@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.cli.app import app
-from sheetbend.pictures.for_scenes import tube
 from sheetbend.pictures.gltf import MOST_FRAMES, write_gltf
+from sheetbend.pictures.moving_shapes import tube
 from sheetbend.pictures.usd import write_usd
 from typer.testing import CliRunner
 

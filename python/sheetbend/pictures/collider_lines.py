@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..arrays.rotations import rotation_matrix
 from ..scene.colliders import Collider, Motion
 from ..scene.distance_field import DistanceField
 from ..scene.scene import Scene
@@ -18,8 +19,7 @@ def collider_lines(scene: Scene, times: Array, positions: Array) -> dict[str, Ar
     """By collider, (frames, lines, 2, 3) m: the ends of short lines that draw it where it is at some times.
 
     A plane is a grid as wide as the motion, a sphere three circles, a capsule its circles and sides, a cylinder its
-    ends and sides, a box its edges,
-    a distance field sections of its mesh.
+    ends and sides, a box its edges, and a distance field sections of its mesh.
 
     Args:
         times: (frames,) s.
@@ -43,15 +43,7 @@ def _poses(motion: Motion, times: Array) -> tuple[Array, Array]:
         np.stack([np.interp(times, motion.times, part[:, k]) for k in range(3)], axis=1)
         for part in (motion.positions, motion.rotations)
     )
-    return x, np.stack([_matrix(vector) for vector in r])
-
-
-def _matrix(vector: Array) -> Array:
-    """Rodrigues' formula."""
-    angle = float(np.linalg.norm(vector))
-    x, y, z = vector / angle if angle > 0.0 else vector
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)
+    return x, np.stack([rotation_matrix("rotation", vector) for vector in r])
 
 
 def _outline(collider: Collider) -> Array:

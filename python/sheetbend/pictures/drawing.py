@@ -106,3 +106,8 @@ def panels_in(
     if title.strip():
         panels[0].set_title(title, fontsize=11, color=INK, loc="left", weight="bold")
     return panels, panels[0]
+
+
+def seen_points(points: np.ndarray) -> np.ndarray:
+    """Those of the points (n, 3) that were seen: rows without NaN."""
+    return points[np.isfinite(points).all(axis=1)]

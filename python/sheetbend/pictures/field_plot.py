@@ -13,7 +13,7 @@ from ..arrays.checks import finite
 from ..errors import InputError
 from ..mesh import Places, TriangleMesh
 from ..optional import require
-from .drawing import ACCENT, GRAY, INK, PALE, WARM, clean, key, new_figure, panels_in
+from .drawing import ACCENT, GRAY, INK, PALE, WARM, clean, key, new_figure, panels_in, seen_points
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -80,7 +80,7 @@ def plot_fields(
         draw = _in_space if field.positions is not None else _on_fabric
         drawn.append(draw(panel, mesh, field, values[k], colors))
         if field.positions is not None:
-            seen = [] if field.measured is None else [_seen(np.asarray(field.measured))]
+            seen = [] if field.measured is None else [seen_points(np.asarray(field.measured))]
             box_in_space(panel, np.vstack([field.positions, *seen]), gravity)
         elif k != first_flat:
             panel.set_ylabel("")
@@ -169,13 +169,9 @@ def _in_space(panel: Any, mesh: TriangleMesh, field: Field, values: Array, color
         at = field.places.positions(x)
         drawn = panel.scatter(*at.T, s=30, c=_masked(values), edgecolors=GRAY, depthshade=False, zorder=9, **colors)
     if field.measured is not None:
-        seen = _seen(np.asarray(field.measured))
+        seen = seen_points(np.asarray(field.measured))
         panel.plot(*seen.T, "o", color=WARM, markersize=2.6, markeredgewidth=0, zorder=10)
     return drawn
-
-
-def _seen(points: Array) -> Array:
-    return points[np.isfinite(points).all(axis=1)]
 
 
 def box_in_space(panel: Any, points: Array, gravity: ArrayLike) -> None:

@@ -14,7 +14,7 @@ from ..files.whole import written
 from ..motion.simulate import Trajectory
 from ..scene.scene import Scene
 from ..version import __version__
-from .for_scenes import Array, Body, bodies, chosen_frames, tube
+from .moving_shapes import Array, MovingShape, chosen_frames, moving_shapes, tube
 
 MOST_FRAMES = 240
 """Each frame is a morph target, of which some programs take no more than a few hundred."""
@@ -49,8 +49,8 @@ def write_gltf(path: str | Path, scene: Scene, motion: Trajectory, *, radius: fl
     frames = chosen_frames(motion.times, MOST_FRAMES)
     file = _File()
     times = file.accessor(motion.times[frames].astype("<f4"), "SCALAR", bounds=True) if len(frames) > 1 else None
-    for body in bodies(scene, motion, frames):
-        file.add(body, times, radius)
+    for shape in moving_shapes(scene, motion, frames):
+        file.add(shape, times, radius)
     with written(path) as beside:
         beside.write_bytes(file.packed(scene.name))
     return len(frames)
@@ -68,22 +68,21 @@ class _File:
         self._channels: list[dict[str, Any]] = []
         self._samplers: list[dict[str, Any]] = []
 
-    def add(self, body: Body, times: int | None, radius: float | None) -> None:
+    def add(self, shape: MovingShape, times: int | None, radius: float | None) -> None:
         """A mesh, its node, and its part of the animation."""
-        x, triangles = body.positions, body.triangles
+        x, triangles = shape.positions, shape.triangles
         if triangles is None:
-            length = float(np.linalg.norm(np.diff(x[0], axis=0), axis=1).sum())
-            x, triangles = tube(x, 0.004 * length if radius is None else radius, _SIDES)
+            x, triangles = tube(x, shape.radius(radius), _SIDES)
         attributes = {"POSITION": self.accessor(x[0].astype("<f4"), "VEC3", bounds=True, target=_ARRAY)}
-        if body.material is not None:
-            attributes["TEXCOORD_0"] = self.accessor(body.material.astype("<f4"), "VEC2", target=_ARRAY)
+        if shape.material is not None:
+            attributes["TEXCOORD_0"] = self.accessor(shape.material.astype("<f4"), "VEC2", target=_ARRAY)
         primitive: dict[str, Any] = {
             "attributes": attributes,
             "indices": self.accessor(triangles.astype("<u4").ravel(), "SCALAR", target=_ELEMENT),
-            "material": int(body.triangles is None),
+            "material": int(shape.triangles is None),
         }
-        mesh: dict[str, Any] = {"name": body.name, "primitives": [primitive]}
-        node = {"name": body.name, "mesh": len(self._meshes)}
+        mesh: dict[str, Any] = {"name": shape.name, "primitives": [primitive]}
+        node = {"name": shape.name, "mesh": len(self._meshes)}
         if times is not None:
             moved = (x[1:] - x[0]).astype("<f4")
             primitive["targets"] = [{"POSITION": self.accessor(m, "VEC3", bounds=True)} for m in moved]

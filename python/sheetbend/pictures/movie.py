@@ -15,7 +15,7 @@ from ..optional import require
 from ..scene.scene import Scene
 from .body_lines import body_lines
 from .collider_lines import collider_lines
-from .drawing import ACCENT, GRAY, INK, WARM, key, new_figure
+from .drawing import ACCENT, GRAY, INK, WARM, key, new_figure, seen_points
 from .field_plot import box_in_space, field_colors
 from .strain import largest_strain
 
@@ -148,7 +148,7 @@ def _picture(motion: Motion, shown: Array, title: str) -> tuple[Figure, Any]:
     reach = [motion.positions[shown][:, drawn_particles].reshape(-1, 3)]
     reach += [lines[shown].reshape(-1, 3) for lines, _ in solids]
     if motion.measured is not None:
-        reach.append(_seen(motion.measured[shown].reshape(-1, 3)))
+        reach.append(seen_points(motion.measured[shown].reshape(-1, 3)))
         key(figure, [("measured markers", WARM), ("to where they should be", INK)])
     box_in_space(panel, np.vstack(reach), motion.scene.gravity)
     clock = figure.text(0.02, 0.02, "", color=INK, fontsize=10)
@@ -163,16 +163,12 @@ def _picture(motion: Motion, shown: Array, title: str) -> tuple[Figure, Any]:
         for particles, line in ropes:
             line.set_data_3d(*motion.positions[frame, particles].T)
         if motion.measured is not None:
-            dots.set_data_3d(*_seen(motion.measured[frame]).T)
+            dots.set_data_3d(*seen_points(motion.measured[frame]).T)
             if motion.simulated is not None:
                 pairs = np.stack([motion.measured[frame], motion.simulated[frame]], axis=1)
                 off.set_segments(pairs[np.isfinite(pairs).all(axis=(1, 2))])
 
     return figure, draw
-
-
-def _seen(points: Array) -> Array:
-    return points[np.isfinite(points).all(axis=1)]
 
 
 def movie_paths(path: Path, names: Sequence[str]) -> Mapping[str, Path]:

@@ -17,7 +17,7 @@ from ..arrays.timeseries import Array
 from ..doubts.prediction import Comparison
 from ..errors import InputError
 from ..files.whole import written
-from .drawing import ACCENT, GRAY, INK, PALE, WARM, clean, key, panels_in, strip
+from .drawing import ACCENT, GRAY, INK, PALE, WARM, clean, key, panels_in, seen_points, strip
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -193,7 +193,7 @@ def plot_shapes(
         raise InputError("measured", "must hold one shape per simulated one, at least one", got, "pair them up")
     columns = min(3, len(measured))
     rows = -(-len(measured) // columns)
-    width, height = np.ptp(_finite(np.vstack([*measured, *simulated])[:, plane]), axis=0)
+    width, height = np.ptp(seen_points(np.vstack([*measured, *simulated])[:, plane]), axis=0)
     cell = 7.6 / columns
     ratio = min(max(height / max(width, 1e-9), 0.2), 1.5)
     size = (7.6, 0.75 + rows * ((cell - 0.35) * ratio + 0.3))
@@ -278,10 +278,6 @@ def _name_shade(panel: Axes, span: tuple[float, float] | None) -> None:
 
 def _liveliest(measured: Array) -> int:
     return int(np.argmax(np.nansum(np.nanvar(measured, axis=0), axis=0)))
-
-
-def _finite(points: Array) -> Array:
-    return points[np.isfinite(points).all(axis=1)]
 
 
 def _same_shape(measured: Array, simulated: Array, times: Array) -> None:

@@ -14,7 +14,7 @@ from ..motion.simulate import Trajectory
 from ..optional import require
 from ..scene.scene import Scene
 from ..version import __version__
-from .for_scenes import Array, Body, bodies
+from .moving_shapes import Array, MovingShape, moving_shapes
 
 SUFFIXES = (".usd", ".usda", ".usdc")
 
@@ -72,44 +72,42 @@ def _write(pxr: dict[str, Any], file: Path, scene: Scene, motion: Trajectory, ra
         attribute.Set(float(quantity.value))
         if quantity.unit:
             attribute.SetDocumentation(quantity.unit)
-    for body in bodies(scene, motion, np.arange(len(motion.times))):
-        at = f"{root.GetPath()}/{_identifier(body.name)}"
-        prim = _curve(pxr, stage, at, body, radius) if body.triangles is None else _mesh(pxr, stage, at, body)
+    for shape in moving_shapes(scene, motion, np.arange(len(motion.times))):
+        at = f"{root.GetPath()}/{_identifier(shape.name)}"
+        prim = _curve(pxr, stage, at, shape, radius) if shape.triangles is None else _mesh(pxr, stage, at, shape)
         for k, code in enumerate(codes.tolist()):
-            prim.GetPointsAttr().Set(_vectors(pxr, body.positions[k]), code)
-            prim.GetVelocitiesAttr().Set(_vectors(pxr, body.velocities[k]), code)
-            prim.GetExtentAttr().Set(_vectors(pxr, _box(body.positions[k])), code)
-        if body.strain is not None:
+            prim.GetPointsAttr().Set(_vectors(pxr, shape.positions[k]), code)
+            prim.GetVelocitiesAttr().Set(_vectors(pxr, shape.velocities[k]), code)
+            prim.GetExtentAttr().Set(_vectors(pxr, _box(shape.positions[k])), code)
+        if shape.strain is not None:
             api = geometry.PrimvarsAPI(prim)
             strain = api.CreatePrimvar("strain", sdf.ValueTypeNames.FloatArray, geometry.Tokens.uniform)
-            for values, code in zip(body.strain, codes.tolist(), strict=True):
+            for values, code in zip(shape.strain, codes.tolist(), strict=True):
                 strain.Set(pxr["Vt"].FloatArray.FromNumpy(np.ascontiguousarray(values, dtype="f4")), code)
     stage.GetRootLayer().Save()
 
 
-def _mesh(pxr: dict[str, Any], stage: Any, at: str, body: Body) -> Any:
+def _mesh(pxr: dict[str, Any], stage: Any, at: str, shape: MovingShape) -> Any:
     geometry, integers = pxr["UsdGeom"], pxr["Vt"].IntArray
-    assert body.triangles is not None  # what sent it here
+    assert shape.triangles is not None  # what sent it here
     mesh = geometry.Mesh.Define(stage, at)
     mesh.CreateSubdivisionSchemeAttr(geometry.Tokens.none)
     mesh.CreateDoubleSidedAttr(True)
-    mesh.CreateFaceVertexCountsAttr(integers.FromNumpy(np.full(len(body.triangles), 3, dtype="i4")))
-    mesh.CreateFaceVertexIndicesAttr(integers.FromNumpy(np.ascontiguousarray(body.triangles.ravel(), dtype="i4")))
-    if body.material is not None:
+    mesh.CreateFaceVertexCountsAttr(integers.FromNumpy(np.full(len(shape.triangles), 3, dtype="i4")))
+    mesh.CreateFaceVertexIndicesAttr(integers.FromNumpy(np.ascontiguousarray(shape.triangles.ravel(), dtype="i4")))
+    if shape.material is not None:
         kind = pxr["Sdf"].ValueTypeNames.TexCoord2fArray
         st = geometry.PrimvarsAPI(mesh).CreatePrimvar("st", kind, geometry.Tokens.vertex)
-        st.Set(pxr["Vt"].Vec2fArray.FromNumpy(np.ascontiguousarray(body.material, dtype="f4")))
+        st.Set(pxr["Vt"].Vec2fArray.FromNumpy(np.ascontiguousarray(shape.material, dtype="f4")))
     return mesh
 
 
-def _curve(pxr: dict[str, Any], stage: Any, at: str, body: Body, radius: float | None) -> Any:
+def _curve(pxr: dict[str, Any], stage: Any, at: str, shape: MovingShape, radius: float | None) -> Any:
     geometry = pxr["UsdGeom"]
-    x = body.positions
-    length = float(np.linalg.norm(np.diff(x[0], axis=0), axis=1).sum())
     curve = geometry.BasisCurves.Define(stage, at)
     curve.CreateTypeAttr(geometry.Tokens.linear)
-    curve.CreateCurveVertexCountsAttr([x.shape[1]])
-    curve.CreateWidthsAttr([0.008 * length if radius is None else 2.0 * radius])
+    curve.CreateCurveVertexCountsAttr([shape.positions.shape[1]])
+    curve.CreateWidthsAttr([2.0 * shape.radius(radius)])
     curve.SetWidthsInterpolation(geometry.Tokens.constant)
     return curve
 

@@ -1,4 +1,4 @@
-"""What other programs get of a motion: cloths as meshes and ropes as lines, at some frames."""
+"""The shapes of a motion as other programs take them: cloths and solids as meshes, ropes as lines, at some frames."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True)
-class Body:
-    """A cloth or a rope over time.
+class MovingShape:
+    """A cloth, the surface of a solid, or a rope, over time.
 
     Attributes:
         name: in the scene.
@@ -35,8 +35,14 @@ class Body:
     material: Array | None = None
     strain: Array | None = None
 
+    def radius(self, given: float | None) -> float:
+        """m, of a rope: as given, or 0.4 % of its length in the first frame."""
+        if given is not None:
+            return given
+        return 0.004 * float(np.linalg.norm(np.diff(self.positions[0], axis=0), axis=1).sum())
 
-def bodies(scene: Scene, motion: Trajectory, frames: Array) -> Iterator[Body]:
+
+def moving_shapes(scene: Scene, motion: Trajectory, frames: Array) -> Iterator[MovingShape]:
     """Cloths and surfaces of solids first, then ropes and rods, at some frames of a motion.
 
     Raises:
@@ -51,9 +57,9 @@ def bodies(scene: Scene, motion: Trajectory, frames: Array) -> Iterator[Body]:
         mesh, own = cloth.mesh, cloth.particles
         strain = np.stack([largest_strain(mesh, frame) for frame in x[:, own]])
         material = mesh.material if mesh.material.ndim == 2 else None
-        yield Body(cloth.name, x[:, own], v[:, own], mesh.triangles, material, strain)
+        yield MovingShape(cloth.name, x[:, own], v[:, own], mesh.triangles, material, strain)
     for rope in scene.ropes.values():
-        yield Body(rope.name, x[:, rope.particles], v[:, rope.particles])
+        yield MovingShape(rope.name, x[:, rope.particles], v[:, rope.particles])
 
 
 def chosen_frames(times: Array, most: int) -> Array:
