@@ -46,6 +46,8 @@ def read_mesh(
 ) -> TriangleMesh:
     """Read a mesh. Its vertices keep the order of the file; in STL, which repeats them, equal ones are merged.
 
+    Triangles that name a vertex twice, in the file or after merging, are left out: they have no area.
+
     Args:
         path: an .obj, .ply or .stl file.
         material: "texture" takes the file's texture coordinates, "unfold" takes the shape in the file as flat fabric
@@ -55,8 +57,6 @@ def read_mesh(
         texture_size: m per unit of texture coordinates, one number or (u, v).
         warp: (3,) direction of warp for "unfold".
         merge: make one vertex of those at equal positions, as exporters split them where normals differ.
-
-    Triangles that name a vertex twice, in the file or after merging, are left out: they have no area.
 
     Warns:
         UserWarning: for each of the mesh's `doubts`, for triangles left out, and for a size that suggests another unit.

@@ -20,12 +20,13 @@ def grid(width: float, height: float, nx: int, ny: int, pattern: str = "alternat
     Args:
         width: along x, m.
         height: along y, m.
+        nx, ny: number of cells along x and y.
         pattern: "alternating" turns the diagonal from cell to cell, "crossed" has both diagonals and a vertex in the
             middle of each cell (after all others), "one_way" has the same diagonal everywhere: the one for bending by
             the curvature model; hinges bend three times as hard along the diagonals as across them.
 
     Raises:
-        MeshError: a size that is not positive, or an unknown pattern.
+        MeshError: a size or a number that is not positive, or an unknown pattern.
     """
     _check_size(width, height)
     _check_count("nx", nx)
@@ -60,6 +61,9 @@ def equilateral(width: float, height: float, n: int) -> TriangleMesh:
         width: along x, m.
         height: along y, m.
         n: triangle sides along x.
+
+    Raises:
+        MeshError: a size or a number that is not positive.
     """
     _check_size(width, height)
     _check_count("n", n)

@@ -83,6 +83,9 @@ def icosphere(radius: float, subdivisions: int) -> TriangleMesh:
     Args:
         radius: of the vertices, m.
         subdivisions: 0 for the icosahedron.
+
+    Raises:
+        MeshError: a radius that is not positive, or a number that is not whole.
     """
     _check("radius", radius > 0 and np.isfinite(radius), radius, "a positive length", "meters")
     whole = subdivisions >= 0 and subdivisions == int(subdivisions)

@@ -9,13 +9,13 @@ from ..arrays.checks import finite
 from ..errors import MeshError
 from . import topology
 from .topology import Indices
+from .validate import NO_AREA
 
 Array = NDArray[np.float64]
 
 _SAME_PLACE = 1e-6  # of the size of the mesh: files hold no more digits
 _JUMP = np.radians(5.0)
 _STEEP = 1e-6  # the part of the warp direction that lies in a triangle, at least, to give it a direction
-_NO_AREA = 1e-12  # of the square of the longest edge: rounding of the coordinates
 
 
 def unfold(vertices: Array, triangles: Indices, warp: ArrayLike = (1.0, 0.0, 0.0)) -> Array:
@@ -113,7 +113,7 @@ def _normals(corners: Array) -> Array:
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.linalg.norm(normal, axis=1)
     longest = ((corners - np.roll(corners, 1, axis=1)) ** 2).sum(-1).max(axis=1)
-    flat = np.flatnonzero(size <= _NO_AREA * longest)
+    flat = np.flatnonzero(size <= NO_AREA * longest)
     if flat.size:
         raise MeshError("vertices", f"give triangle {flat[0]} no area", corners[flat[0]].tolist(), "remove or merge it")
     unit: Array = normal / size[:, None]

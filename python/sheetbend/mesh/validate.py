@@ -12,7 +12,7 @@ from .topology import Indices
 
 Array = NDArray[np.float64]
 
-_NO_AREA = 1e-12  # of the square of the longest edge: rounding of the coordinates
+NO_AREA = 1e-12  # of the square of the longest edge: rounding of the coordinates
 
 
 def rows(name: str, values: ArrayLike, width: int) -> Array:
@@ -136,7 +136,7 @@ def refuse_flat_or_clockwise(corners: Array) -> None:
     """
     areas = signed_areas(corners)
     longest = ((corners - np.roll(corners, 1, axis=1)) ** 2).sum(-1).max(axis=1)
-    flat = np.flatnonzero(np.abs(areas) <= _NO_AREA * longest)
+    flat = np.flatnonzero(np.abs(areas) <= NO_AREA * longest)
     if flat.size:
         problem = f"gives triangle {flat[0]} no area ({_more(flat)})"
         raise MeshError("material", problem, corners[flat[0]].tolist(), "remove or merge such triangles")
