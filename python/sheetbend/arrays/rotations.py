@@ -22,9 +22,7 @@ def rotation_matrix(field: str, given: ArrayLike | None) -> Array:
         return np.eye(3)
     a = finite(field, given, None, SceneError)
     if a.shape == (3,):
-        angle = float(np.linalg.norm(a))
-        half = 0.5 * np.sinc(angle / (2.0 * np.pi))  # sin(angle/2)/angle
-        return matrices_of(np.append(half * a, np.cos(angle / 2.0)))
+        return matrices_of(quaternion_of(a))
     if a.shape == (4,):
         if not a.any():
             raise SceneError(field, "has no length", a.tolist(), "give a quaternion (x, y, z, w)")
@@ -38,6 +36,19 @@ def rotation_matrix(field: str, given: ArrayLike | None) -> Array:
         raise SceneError(field, problem, a.tolist(), "give a rotation: its columns are the body's axes")
     u, _, vt = np.linalg.svd(a)
     return np.asarray(u @ vt)
+
+
+def quaternion_of(vector: Array) -> Array:
+    """(4,) of a rotation vector (3,)."""
+    angle = float(np.linalg.norm(vector))
+    half = 0.5 * np.sinc(angle / (2.0 * np.pi))  # sin(angle/2)/angle
+    return np.append(half * vector, np.cos(angle / 2.0))
+
+
+def product(first: Array, second: Array) -> Array:
+    """(4,) the rotation by the second quaternion, then by the first."""
+    a, aw, b, bw = first[:3], first[3], second[:3], second[3]
+    return np.append(aw * b + bw * a + np.cross(a, b), aw * bw - a @ b)
 
 
 def matrices_of(quaternions: ArrayLike) -> Array:

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..scene.compiled import CompiledScene
+from ..scene.domain import NOT_NEGATIVE, POSITIVE
 from ..scene.scene import Scene
 from .gradient_probe import DIFFERENCES_BOUND, JITTERS, LOUD, Probe, jittered
 from .gradient_report import COMPLEX_STEP_BOUND, GradientReport, GradientRow
@@ -27,11 +28,7 @@ from .tape import budget
 
 RUNS = 6.0  # of the scene for differences along one direction, mostly
 SHORTER = (1.0, 0.5, 0.25, 0.125)
-POSITIVE = (
-    *("mass", "compliance", "damping", "drag_linear", "drag_quadratic", "air_normal", "air_tangential"),
-    *("volume", "volume_compliance", "friction", "contact_radius", "contact_stiffness", "collider_size", "restitution"),
-    "contact_dissipation",
-)
+SIZED = (*NOT_NEGATIVE, *POSITIVE)  # arrays whose steps are judged against their own entries, however small these are
 
 
 def check_gradients(
@@ -167,7 +164,7 @@ class _Checked:
         offset, size = self.compiled.layout[name]
         part, own = self.adjoint[offset : offset + size], probe.inputs[offset : offset + size]
         if samples == 0:
-            return _row(name, size, [self._all_at_once(part, own, offset, name in POSITIVE, rng)])
+            return _row(name, size, [self._all_at_once(part, own, offset, name in SIZED, rng)])
         largest = np.argsort(-np.abs(part))[: samples // 2]
         random = rng.choice(size, min(size, samples - len(largest)), replace=False)
         entries = []
@@ -175,7 +172,7 @@ class _Checked:
             direction = np.zeros(len(self.adjoint))
             direction[offset + i] = 1.0
             exact = probe.complex_step(direction)
-            size_of = probe.size(float(own[i]), 1e-3, name in POSITIVE, exact)
+            size_of = probe.size(float(own[i]), 1e-3, name in SIZED, exact)
             found = probe.differences(direction, 1e-4 * size_of, exact)
             of_array = float(np.abs(part).max())
             moved = self._rounding(direction, self.jitter[:, offset + i], float(part[i]), exact, of_array)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_increasing, check_positive, finite
-from ..arrays.rotations import rotation_vectors
+from ..arrays.rotations import product, quaternion_of, rotation_vectors
 from ..errors import SceneError
 
 Array = np.ndarray
@@ -332,18 +332,9 @@ def _turn_to(field_name: str, axis: Array) -> Array:
     return across * (angle / sine) if sine > 0.0 else np.array([angle, 0.0, 0.0])
 
 
-def _quaternion(rotation: Array) -> Array:
-    angle = float(np.linalg.norm(rotation))
-    return np.append(np.sinc(angle / (2.0 * np.pi)) * 0.5 * rotation, np.cos(0.5 * angle))
-
-
 def _composed(turns: Array, first: Array) -> Array:
     """Rotation vectors (knots, 3) of `first`, then each of `turns`, continuous from knot to knot."""
     if not first.any():
         return turns
-    b, bw = _quaternion(first)[:3], _quaternion(first)[3]
-    products = []
-    for turn in turns:
-        a, aw = _quaternion(turn)[:3], _quaternion(turn)[3]
-        products.append(np.append(aw * b + bw * a + np.cross(a, b), aw * bw - a @ b))
-    return rotation_vectors(np.array(products), first)
+    before = quaternion_of(first)
+    return rotation_vectors(np.array([product(quaternion_of(turn), before) for turn in turns]), first)
