@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import sheetbend as sb
+from sheetbend.report.dependence import Dependence, dependences, with_dependences
 from sheetbend.report.fit_result import FitResult
-from sheetbend.report.resting import Rests, rests, told_to_rest
 from sheetbend.result.estimate import Estimate, Premise
 from test_contact_fit import SOLVER as DRAGGING
 from test_contact_fit import TIMES as DRAGGED
@@ -193,7 +193,7 @@ def test_an_error_that_shows_is_not_what_an_estimate_rests_on(clean: sb.Recordin
     """1 % of the length moves EI by 190 half-widths, 1 % of the density by 40; but the length would be named."""
     length, density = premise(plain, "rope_length"), premise(plain, "rope_density")
     assert length.moved["rope_EI"] > 4 * density.moved["rope_EI"]
-    assert rests(plain.result)["rope_EI"].name == "rope_density"
+    assert dependences(plain.result)["rope_EI"].name == "rope_density"
     assert 0 <= density.leaves < 1e-3 < 100 < length.leaves
     left = math.sqrt(2 * fit(CHANGED["rope_length"][0](1e-3), clean).result.cost)
     assert length.leaves == pytest.approx(10 * left, rel=0.02)
@@ -230,10 +230,10 @@ def test_an_estimate_rests_on_what_may_move_it_unseen() -> None:
     length = Premise(**other, moved={"friction": 0.01}, leaves=1e4)
     course = {"recordings": (), "optimizer": "", "iterations": 1, "seconds": 1.0, "converged": True}
     whole = FitResult(estimates=estimates, premises=(table, length), cost=380.0, rows=760, **course)
-    assert rests(whole) == {"friction": Rests("table about x", "0.092 degrees", 0)}
+    assert dependences(whole) == {"friction": Dependence("table about x", "0.092 degrees", 0)}
 
     def told(result: FitResult) -> FitResult:
-        return replace(result, estimates=told_to_rest(result))
+        return replace(result, estimates=with_dependences(result))
 
     text = told(whole).report()
     assert "right to: table about x 0.092 degrees. A larger error" in text
@@ -246,18 +246,18 @@ def test_an_estimate_rests_on_what_may_move_it_unseen() -> None:
     moved = {f"{name}_of_the_whole_table_and_its_feet": by for name, by in table.moved.items()}
     narrow = told(replace(whole, estimates=long, premises=(replace(table, moved=moved),))).report()
     assert "+/- in all: friction_of_the_whole_table_and_its_feet 0.021, EI_of" in narrow
-    assert [e.words for e in told_to_rest(whole)] == [
+    assert [e.words for e in with_dependences(whole)] == [
         "known to 2 %, if the error in table about x is below 0.092 degrees",
         "known to 2 %",
     ]
     counted = told(replace(whole, premises=(replace(table, sd=DEGREE), replace(length, moved={}))))
-    assert rests(counted) == {} and [e.in_all for e in counted.estimates] == [0.0072, 0.0025]
+    assert dependences(counted) == {} and [e.in_all for e in counted.estimates] == [0.0072, 0.0025]
     assert "in all" not in counted.report()
-    assert rests(replace(whole, premises=(replace(table, leaves=1e3), length))) == {}
+    assert dependences(replace(whole, premises=(replace(table, leaves=1e3), length))) == {}
     unseen = replace(whole, premises=(table, replace(length, leaves=0.0)))
-    assert rests(unseen)["friction"] == Rests("table about x", "0.092 degrees", 1)
+    assert dependences(unseen)["friction"] == Dependence("table about x", "0.092 degrees", 1)
     doubtful = told(replace(whole, estimates=tuple(replace(e, verdict="doubtful") for e in estimates)))
-    assert rests(doubtful) == {} and "right to" not in doubtful.report() and "in all" not in doubtful.report()
+    assert dependences(doubtful) == {} and "right to" not in doubtful.report() and "in all" not in doubtful.report()
 
 
 def test_the_report_stays_narrow(recording: sb.Recording, plain: sb.Fit) -> None:

@@ -25,8 +25,8 @@ from ..minimum.counts import counted
 from ..minimum.field_fits import field_fits
 from ..minimum.fine_meshes import at_the_limit
 from ..minimum.smooth import Field
+from ..report.dependence import with_dependences
 from ..report.fit_result import FitResult
-from ..report.resting import told_to_rest
 from .conclusion import Conclusion
 from .reached import Reached
 from .rows import curves, every_end, given_rows, growth_rows, recording_fit, start_rows
@@ -144,4 +144,4 @@ def result_of(
         judging=(all_evaluations - evaluations, all_jacobians - jacobians),
         warnings=warnings,
     )
-    return replace(result, estimates=told_to_rest(result))
+    return replace(result, estimates=with_dependences(result))

@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
+from ..report.dependence import with_dependences
 from ..report.fit_result import FitResult
-from ..report.resting import told_to_rest
 from .model import NAME
 
 UNIT = 1.0  # kg/m
@@ -35,7 +35,7 @@ def over_density(result: FitResult) -> FitResult:
     """The same fit with each quantity that has a mass in it over the density: names, units and words; numbers are
     those for 1 kg/m. The density is none of what they rest on."""
     result = replace(result, premises=tuple(p for p in result.premises if p.name != _DENSITY))
-    result = replace(result, estimates=told_to_rest(result))
+    result = replace(result, estimates=with_dependences(result))
     data = result.to_dict()
     units = {e.name: e.unit for e in result.estimates} | {g.name: g.unit for g in result.given}
     units |= {p.name: p.unit for p in result.premises}

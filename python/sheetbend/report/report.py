@@ -12,6 +12,7 @@ from ..quantities.wording import figures, short
 from ..result.estimate import UNSOUND, Estimate, Given
 from ..result.motions import MotionGrowth
 from ..result.result import FitData
+from .dependence import PLAUSIBLE, Dependence, dependences
 from .report_bootstrap import bootstrap
 from .report_contact import contact_sections
 from .report_driven import driven_sections
@@ -21,7 +22,6 @@ from .report_profiles import lopsided_profiles
 from .report_recordings import forces, held_out_motion, recordings
 from .report_shot import shot_motions
 from .report_starts import groups_of_starts, starts_note
-from .resting import PLAUSIBLE, Rests, rests
 from .tables import WIDTH, Section, plain_section, rich_section, wide
 
 if TYPE_CHECKING:
@@ -147,11 +147,11 @@ def _parameters(result: FitData) -> Section:
             words = f"{', '.join(f'{name} {in_all[name]}' for name in shared)}, {words}"
         else:
             headers, rows = (*headers, IN_ALL), beside
-        notes.insert(0, (IN_ALL, f"{words}{_most(rests(result))}"))
+        notes.insert(0, (IN_ALL, f"{words}{_most(dependences(result))}"))
     return Section("Parameters", headers, tuple(rows), tuple(notes))
 
 
-def _most(found: Mapping[str, Rests]) -> str:
+def _most(found: Mapping[str, Dependence]) -> str:
     """Which given values count the most, for which parameters."""
     of: dict[str, list[str]] = {}
     for name, on in found.items():

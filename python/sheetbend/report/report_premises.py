@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from ..quantities.wording import short
 from ..result.estimate import Estimate, Premise
 from ..result.result import FitData
-from .resting import needed
+from .dependence import needed
 from .tables import Section, wide
 
 PREMISES_SHOWN = 8

@@ -1,8 +1,8 @@
-"""How far given numbers, wrong by as much as they may well be, would move an estimate without a trace.
+"""How far errors in given values would move an estimate without a trace in the residuals.
 
-An error that leaves much in the residuals is named (doubts.wrong_given). So an error counts here up to the size from
-which on it would be. Intervals take given numbers as exact. So the report shows a second half-width, in which these
-errors count as independent of each other.
+An error that leaves much in the residuals is named (doubts.wrong_given), so an error counts here only up to that size.
+Intervals take given values as exact. The report therefore shows a second half-width, which counts these errors as
+independent of each other.
 """
 
 from __future__ import annotations
@@ -16,25 +16,25 @@ from ..result.estimate import Estimate, Premise
 from ..result.result import FitData
 
 PLAUSIBLE = "1 %, 1 mm, 1 ms or 0.25 degrees"
-"""Of most given numbers, the error that may well be; of clocks and sizes it is less (`doubts.told.GROUPS`)."""
+"""The plausible error in most given values; in clocks and sizes it is less (`doubts.told.GROUPS`)."""
 LEVEL = 0.25
-"""Degrees by which a direction may well be wrong: what a spirit level or an eye along an edge leaves. Other numbers may
-be wrong by the error whose effect the report tells."""
+"""The plausible error in a direction, in degrees: what a spirit level or an eye along an edge leaves. In other values
+it is the error whose effect the report shows."""
 STANDS = ("identified", "weak")
 NAMED = 0.85 / 0.15
 """An error is named where it leaves so many times what else the fit leaves beyond noise (doubts.causes.MOST)."""
-SURELY = 2.0  # standard deviations of the sum of squares of noise, which nobody tells from what is left beyond it
+SURELY = 2.0  # standard deviations of the sum of squares of noise: a misfit below that is not told from noise
 _IF = "if the error in "
 
 
 @dataclass(frozen=True)
-class Rests:
-    """What an estimate rests on: given numbers whose errors may move it by more than its half-width, and not be seen.
+class Dependence:
+    """What an estimate depends on: given values whose errors may move it by more than its half-width, and not be seen.
 
     Attributes:
-        name: of the one that moves it the most.
-        size: how well that one has to be known for the interval to hold.
-        others: how many more there are.
+        name: of the value that moves it the most.
+        size: the error in that value that moves the estimate by just its half-width, with unit.
+        others: how many more such values there are.
     """
 
     name: str
@@ -48,19 +48,20 @@ class Rests:
         return f"{_IF}{self.name} is below {self.size}{more if self.others else ''}"
 
 
-def rests(result: FitData) -> dict[str, Rests]:
-    """By estimate, what it rests on; without those that no such error moves so far, and those that do not stand."""
+def dependences(result: FitData) -> dict[str, Dependence]:
+    """By name of an estimate, what it depends on; estimates that no such error moves so far are left out, and so are
+    those whose verdict is none of STANDS."""
     found = {}
     for e in result.estimates:
         far = list(_far(result, e))
         if far:
             _, off_by, most = max(far, key=lambda each: each[0])
-            found[e.name] = Rests(most.name, _size(most, off_by), len(far) - 1)
+            found[e.name] = Dependence(most.name, _size(most, off_by), len(far) - 1)
     return found
 
 
 def needed(result: FitData) -> dict[str, str]:
-    """By given number that an estimate rests on, how well it has to be known for the intervals of all to hold."""
+    """By name of a given value that an estimate depends on, the largest error at which all intervals still hold."""
     found: dict[str, tuple[float, Premise]] = {}
     for e in result.estimates:
         for _, off_by, p in _far(result, e):
@@ -68,10 +69,10 @@ def needed(result: FitData) -> dict[str, str]:
     return {name: _size(p, off_by) for name, (off_by, p) in found.items()}
 
 
-def told_to_rest(result: FitData) -> tuple[Estimate, ...]:
-    """The estimates, each with what it rests on in its words, in place of what was said there before, and with its
-    half-width in all."""
-    found = rests(result)
+def with_dependences(result: FitData) -> tuple[Estimate, ...]:
+    """The estimates, each with its dependence in its words, in place of an earlier one, and with the half-width that
+    counts the errors of given values (`in_all`)."""
+    found = dependences(result)
     return tuple(
         replace(
             e,
@@ -85,16 +86,16 @@ def told_to_rest(result: FitData) -> tuple[Estimate, ...]:
 
 
 def _far(result: FitData, e: Estimate) -> Iterator[tuple[float, float, Premise]]:
-    """By how much each given number may move an estimate, of those that may move it by more than its half-width, and
-    the error of it that moves it by just that."""
+    """Of each given value that may move an estimate by more than its half-width: how far it may, the error that moves
+    it by just the half-width, and the value."""
     for may, moves, p in _may_move(result, e):
         if e.half_width and may > e.half_width:
             yield may, e.half_width / moves, p
 
 
 def _may_move(result: FitData, e: Estimate) -> Iterator[tuple[float, float, Premise]]:
-    """By how much each given number without a standard deviation may move an estimate that stands, and by how much an
-    error of one unit of it does."""
+    """Of each given value without a standard deviation: how far it may move an estimate that stands, how far an error
+    of one unit does, and the value."""
     for p in result.premises if e.verdict in STANDS else ():
         moves = abs(p.moved.get(e.name, 0.0)) / p.off_by
         if p.sd is None:
@@ -102,12 +103,12 @@ def _may_move(result: FitData, e: Estimate) -> Iterator[tuple[float, float, Prem
 
 
 def _plausible(premise: Premise) -> float:
-    """Error that may well be, in its unit."""
+    """Plausible error in the value, in its unit."""
     return math.radians(LEVEL) if premise.unit == "rad" else premise.off_by
 
 
 def _unseen(result: FitData, premise: Premise) -> float:
-    """Error up to which it is not surely named, in its unit."""
+    """Error in the value up to which it is not surely named, in its unit."""
     noise = 2.0 * result.cost / max(result.rows, 1)
     alike = result.rows * (1.0 - 1.0 / max(result.autocorrelation_time, 1.0))
     beyond = noise * max(SURELY * math.sqrt(2.0 * result.rows), alike)
