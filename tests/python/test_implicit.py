@@ -227,6 +227,8 @@ def test_the_balance_of_every_newton_step_is_shown() -> None:
     assert found.report().count("\n") == 30
     with pytest.raises(sb.InputError, match=r"solver\.method"):
         sb.force_balance(strip(5.0), 0.5, replace(IMPLICIT, method="newton"))
+    with pytest.raises(sb.InputError, match=r"write sb\.Solver\(h=0\.01\)"):
+        sb.force_balance(strip(5.0), 0.5, 0.01)  # type: ignore[arg-type]
 
 
 def test_forces_that_do_not_balance_are_told() -> None:

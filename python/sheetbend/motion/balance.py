@@ -1,4 +1,4 @@
-"""What force every Newton step of an implicit substep leaves."""
+"""The unbalanced force after each Newton step of the implicit method."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from .solver import Solver
 
 @dataclass(frozen=True)
 class ForceBalance:
-    """The largest force that does not balance, over the largest force, at the start of a substep and after each of its
-    Newton steps.
+    """How the forces of each substep of the method "implicit" came into balance; `force_balance` makes it.
 
     Attributes:
-        times: (substeps,) s, at their ends.
-        left: (substeps, blocks, 1 + most Newton steps); NaN after a block's last one. Blocks are the scene's connected
-            parts.
+        times: (substeps,) s, the ends of the substeps.
+        left: (substeps, blocks, 1 + most Newton steps), the largest unbalanced force over the largest force: at the
+            start of the substep and after each Newton step, NaN after a block's last step. Blocks are the connected
+            parts of the scene.
     """
 
     times: Array
@@ -29,11 +29,11 @@ class ForceBalance:
 
     @property
     def newton_steps(self) -> Array:
-        """(substeps, blocks) after the first, which starts from the state before."""
+        """(substeps, blocks), how many Newton steps each block took."""
         return np.isfinite(self.left).sum(axis=2) - 1
 
     def report(self) -> str:
-        """A line for each substep: of its slowest block."""
+        """A table with a line for each substep, of the block that took the most Newton steps."""
         lines = ["substep  t [s]     force that is left, of the largest"]
         for k, (time, blocks) in enumerate(zip(self.times, self.left, strict=True), start=1):
             slowest = blocks[np.isfinite(blocks).sum(axis=1).argmax()]
@@ -45,15 +45,16 @@ def force_balance(scene: Scene, end: float, solver: Solver, values: Mapping[str,
     """Record how the forces of every substep came into balance.
 
     Args:
-        scene: is frozen by this.
-        end: s, of the motion; on the substep grid.
-        solver: of the method "implicit".
+        scene: frozen by this call.
+        end: end of the motion, s; a multiple of the substep.
+        solver: with the method "implicit".
         values: quantities to change, by name.
 
     Raises:
-        InputError: another method, an end off the grid.
+        InputError: another method, or an end between two substeps.
         UnbalancedError, DivergenceError: as `simulate`.
     """
+    solver = Solver.given(solver)
     if solver.method != "implicit":
         fix = "use 'implicit': the others end after their iterations"
         raise InputError("solver.method", "balances no forces", solver.method, fix)

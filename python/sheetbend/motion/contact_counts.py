@@ -10,7 +10,7 @@ import numpy as np
 
 
 class ContactMode(IntEnum):
-    """What a particle does at a collider."""
+    """Whether a particle is apart from a collider, sticks to it or slides on it."""
 
     APART = 0
     STICKS = 1
@@ -19,21 +19,21 @@ class ContactMode(IntEnum):
 
 @dataclass(frozen=True)
 class ContactCounts:
-    """What the particles of one contact did, over all substeps of a simulation.
+    """How often the particles of one contact touched, slid and stuck, over all substeps of a simulation.
 
-    Of self-contact with friction it counts pairs in the place of particles.
+    For self-contact with friction, pairs of pieces are counted instead of particles.
 
     Attributes:
-        most: how many of them touched at once, at most.
-        began: how often one began to touch. Those that touch in the first substep have not begun to; bounces count.
-        ended: how often one came off, bounces again.
-        sliding_share: of what touched, particle by particle and substep by substep, how much slid; 0 where nothing
-            touched.
-        sticking_share: likewise, how much was held by friction.
-        bdf1_share: of the scene's substeps, how many went with BDF1. With integrator "bdf2" that is the first one, and
-            three from where a contact begins. BDF1 damps like zeta = omega h/2.
-        deepest: m, how far inside the collider one was at any frame, counted from the contact's radius; of one that
-            is held or driven nothing counts, as it touches nothing. None of self-contact.
+        most: the largest number of particles that touched in one substep.
+        began: how often a particle began to touch, bounces included; particles that touch in the first substep are not
+            counted.
+        ended: how often a particle came off, bounces included.
+        sliding_share: of all particles that touched, summed over the substeps, the share that slid; 0 if none touched.
+        sticking_share: likewise, the share that friction held.
+        bdf1_share: the share of the scene's substeps that used BDF1. With the integrator "bdf2" these are the first
+            substep and three from the start of each contact. BDF1 damps like zeta = omega h/2.
+        deepest: m, the largest depth of a particle in the collider at any frame, relative to the contact's radius.
+            Particles that are held or driven have no contact and are left out. None for self-contact.
     """
 
     most: int
@@ -46,8 +46,12 @@ class ContactCounts:
 
 
 def contact_modes(sizes: Mapping[str, int], modes: np.ndarray) -> dict[str, np.ndarray]:
-    """By the contacts' names, with as many particles as `sizes` says, the part (frames, particles) of what the core
-    tells of all of them one after the other, (frames, all particles)."""
+    """The modes of each contact, (frames, particles), by its name.
+
+    Args:
+        sizes: number of particles of each contact, by its name.
+        modes: (frames, all particles) from the core, those of one contact after those of another.
+    """
     ends = np.cumsum(list(sizes.values()))
     return dict(zip(sizes, np.split(modes, ends[:-1], axis=1), strict=True)) if sizes else {}
 
@@ -55,7 +59,7 @@ def contact_modes(sizes: Mapping[str, int], modes: np.ndarray) -> dict[str, np.n
 def contact_counts(
     names: Sequence[str], counted: Sequence[Mapping[str, int]], bdf1_share: float, deepest: Mapping[str, float]
 ) -> dict[str, ContactCounts]:
-    """By the contacts' names, from what the core has counted and how deep particles were."""
+    """The counts of each contact by its name, from those of the core and the depths by name, m."""
     counts = {}
     for name, c in zip(names, counted, strict=True):
         slid = c["sliding"] / max(c["touching"], 1)

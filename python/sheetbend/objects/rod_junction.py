@@ -1,4 +1,4 @@
-"""Where rods meet: a small rigid piece in which they begin and end, such as the molded part of a branched cable."""
+"""Junctions of rods: small rigid pieces in which rods begin and end, such as the molded part of a branched cable."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Facing:
 
 
 class Junction:
-    """Rods that begin or end in one junction share a node and keep the angles that they have there at the start.
+    """A rigid piece in which rods begin or end; they share a node and keep their angles there.
 
     Every rod has a short link of its own in the junction, and the half link next to it bends and twists against that,
     as at a grip. The short links are joined without compliance, so that each rod keeps its own stiffness up to the
@@ -73,8 +73,17 @@ class Junction:
     def join(
         self, scene: Scene, label: str, node: int, ghost: int, director: int, normal: int | None, arrives: bool
     ) -> None:
-        """Take in a rod's short link between `node` and `ghost`, which does not shear; it `arrives` where the rod
-        ends."""
+        """Join a rod's short link to those that are joined already, at the angles that they have now.
+
+        Args:
+            scene: of the rod.
+            label: prefix of the names of the constraints.
+            node: the shared node.
+            ghost: the other node of the short link.
+            director: of the short link.
+            normal: of its section, for rods that shear; the short link does not.
+            arrives: whether the rod ends in the junction; otherwise it begins there.
+        """
         x = scene.nodes
         reach = float(np.linalg.norm(x[ghost] - x[node]))
         scene.add_constraints("distance", [[node, ghost]], name=f"{label}_stub", rest=reach)

@@ -148,12 +148,12 @@ class Body:
         return BodyCapsules(self, places, edges)
 
     def weights(self, places: Array) -> Array:
-        """(n, 4) expressions: of the nodes in the sums that the places (n, 3) of the body's frame are."""
+        """(n, 4) expressions: weights of the body's nodes in the sums that make points (n, 3) m of its frame."""
         return np.stack([np.append(expressions(1.0), self.coordinates(place)) for place in places])
 
     def start_terms(self) -> list[Term]:
-        """Terms of the nodes' first positions and velocities: what the start makes of the quantities, less what stands
-        in the scene's arrays already."""
+        """Terms that make the nodes' initial positions and velocities depend on the quantities of the start: the
+        expressions minus the numbers that are in the scene's arrays already."""
         if self.role == "driven":
             return []
         s, index = self.start, 3 * self.particles[:, None] + np.arange(3)
@@ -168,11 +168,11 @@ class Body:
         return found + terms_of("velocity", index, rates - self.scene.base_arrays()["velocity"][self.particles])
 
     def coordinates(self, place: Array) -> Array:
-        """(3,) expressions: a place (3,) of the body's frame, counted from p along the principal axes."""
+        """(3,) expressions: a place (3,) m of the body's frame, from the center of mass along the principal axes."""
         return self.directions(place - self.center)
 
     def directions(self, way: Array) -> Array:
-        """(3,) expressions: a direction (3,) of the body's frame, along the principal axes."""
+        """(3,) expressions: a direction (3,) of the body's frame, in components along the principal axes."""
         return np.asarray(self.axes.T @ way)
 
     def pose(self, motion: HasMotion | ArrayLike, values: Values = None) -> tuple[Array, Array]:
@@ -195,26 +195,26 @@ class Body:
         return p - frame @ numbers(self.center, at), frame
 
     def turned(self, way: ArrayLike) -> Array:
-        """(3,) a direction of the body's frame in the world, as the scene was built."""
+        """A direction (3,) of the body's frame in the world's axes (3,), at the initial positions of the scene."""
         return np.asarray(self.pose(self.scene.nodes)[1] @ np.asarray(way, dtype=float))
 
     def quaternions(self, motion: HasMotion | ArrayLike, values: Values = None) -> Array:
-        """(..., 4), (x, y, z, w), from the body's axes to the world's; along a motion each on the side of the one
-        before."""
+        """(..., 4), (x, y, z, w), from the body's axes to the world's. Of the two signs each frame of a motion has the
+        one that is nearer to the frame before."""
         return quaternions_of(self.pose(motion, values)[1])
 
     def angular_velocity(self, motion: HasMotion) -> Array:
-        """(frames, 3) rad/s, in the world's axes."""
+        """Angular velocity (frames, 3) rad/s, in the world's axes."""
         _, a = self._nodes(motion.nodes)
         _, v = self._nodes(motion.node_velocities)
         return np.asarray(0.5 * np.cross(a, v, axis=-2).sum(axis=-1))
 
     def momentum(self, motion: HasMotion, values: Values = None) -> Array:
-        """(frames, 3) kg m/s."""
+        """Linear momentum (frames, 3) kg m/s."""
         return np.asarray(self.inertia_of_nodes(values)[0] * self._nodes(motion.node_velocities)[0])
 
     def angular_momentum(self, motion: HasMotion, values: Values = None, about: ArrayLike | None = None) -> Array:
-        """(frames, 3) kg m^2/s about the center of mass, or about a fixed point (3,) m."""
+        """Angular momentum (frames, 3) kg m^2/s, about the center of mass or about a fixed point (3,) m."""
         x, a = self._nodes(motion.nodes)
         v, rates = self._nodes(motion.node_velocities)
         mass, *J = self.inertia_of_nodes(values)
@@ -224,18 +224,18 @@ class Body:
         return spin + mass * np.cross(x - finite(f"{self.name}.about", about, (3,), SceneError), v)
 
     def kinetic_energy(self, motion: HasMotion, values: Values = None) -> Array:
-        """(frames,) J."""
+        """Kinetic energy (frames,) J, of translation and rotation."""
         v, rates = self._nodes(motion.node_velocities)
         mass, *J = self.inertia_of_nodes(values)
         return np.asarray(0.5 * (mass * (v**2).sum(axis=-1) + ((rates**2).sum(axis=-2) * J).sum(axis=-1)))
 
     def energy(self, motion: HasMotion, values: Values = None) -> Array:
-        """(frames,) J, kinetic and of the weight, which is zero at the world's origin."""
+        """Kinetic and potential energy (frames,) J; that of the weight is zero at the world's origin."""
         x, _ = self._nodes(motion.nodes)
         return self.kinetic_energy(motion, values) - self.inertia_of_nodes(values)[0] * (x @ self.scene.gravity)
 
     def inertia_of_nodes(self, values: Values = None) -> Array:
-        """(4,) the mass, kg, and J1, J2, J3, kg m^2."""
+        """Masses of the four nodes (4,): m in kg, and J1, J2, J3 in kg m^2."""
         at = self.values(values)
         moments = np.array([at[f"{self.name}_inertia_{k}"] for k in (1, 2, 3)])
         return np.append(at[f"{self.name}_mass"], 0.5 * moments.sum() - moments)

@@ -1,4 +1,4 @@
-"""Closed shapes that ropes and cloth touch: planes, spheres, capsules, cylinders, boxes; standing or moving."""
+"""Shapes that ropes, cloths and bodies touch: planes, spheres, capsules, cylinders and boxes, at rest or moving."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Motion:
-    """Where a collider's frame is at knots.
+    """The poses of a collider's frame at knots.
 
     Attributes:
         times: (knots,) s.
@@ -35,7 +35,13 @@ class Motion:
 
 @dataclass(frozen=True, kw_only=True)
 class Collider:
-    """What the shapes have in common: a name, and a motion or none."""
+    """Base of the shapes.
+
+    Attributes:
+        shape: the name of the kind of shape in the core and in configurations.
+        name: prefix of its quantities.
+        motion: of its frame; None for a shape at rest.
+    """
 
     shape: ClassVar[str]
     name: str = ""
@@ -48,10 +54,10 @@ class Collider:
         rotations: ArrayLike | None = None,
         interpolation: str = "cubic",
     ) -> Self:
-        """The same shape with a motion, given from where it stands.
+        """The same shape with a motion, given relative to where it is now.
 
         Args:
-            times: (knots,) s, increasing; before the first and after the last one it stands.
+            times: (knots,) s, increasing; the shape is at rest before the first and after the last one.
             displacements: (knots, 3) m, of its origin: the point of a plane, the center of any other shape.
             rotations: (knots, 3) rad, about its origin, as vectors along the axis that are as long as the angle;
                 none by default. Turns beyond half a turn are followed where neighboring knots are less than that apart.
@@ -73,7 +79,7 @@ class Collider:
 
     @property
     def poses(self) -> Motion:
-        """Its motion; of one that stands a single knot."""
+        """The motion of its frame; a single knot if it is at rest."""
         if self.motion is not None:
             return self.motion
         position, rotation = self._placed()
@@ -81,28 +87,28 @@ class Collider:
 
     @property
     def reach(self) -> float:
-        """m, how far from its surface it knows distances: contact radii must be smaller."""
+        """m, the distance from its surface up to which distances are known; contact radii must be smaller."""
         return np.inf
 
     @property
     def half_thickness(self) -> float:
-        """m, from its middle to its surface, where that is nearest."""
+        """m, the smallest distance from its middle to its surface."""
         raise NotImplementedError
 
     @property
     def extent(self) -> float:
-        """m, how far its surface is from its origin at most."""
+        """m, the largest distance of its surface from its origin."""
         raise NotImplementedError
 
     @property
     def specification(self) -> dict[str, Any]:
-        """What the core knows of it but for its name, its lengths and where it is."""
+        """Its kind and its knots for the core; name, lengths and poses are handed over apart."""
         poses = self.poses
         return {"shape": self.shape, "times": poses.times.tolist(), "interpolation": poses.interpolation}
 
     @property
     def sizes(self) -> Mapping[str, float]:
-        """Its lengths, m, in the order that the core knows them in."""
+        """Its lengths by name, m, in the order in which the core takes them."""
         raise NotImplementedError
 
     def _placed(self) -> tuple[Array, Array]:
