@@ -9,24 +9,25 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import check_positive, finite
+from ..arrays.checks import check_positive
 from ..errors import SceneError
 from ..quantities.quantities import product
 from ..scene.body import BodyPoint
 from ..scene.scene import Array, Scene
 from .chain import add_drag, add_links, add_masses
-from .grip import Grip, any_across, carried
+from .grip import Grip
 from .grip_freedom import spread_shift
 from .rod_end import End, check_roll, spread_roll
+from .rod_frames import Frames, Line, add_frames
 from .rod_joints import Joints, shear, weigh
 from .rod_junction import STUB_MASS, Facing, Junction
-from .rod_shape import initial_frames, initial_shape
+from .rod_shape import initial_shape
 from .rope import Rope
 from .yielding import check_yield
 
-# Torque per angle that holds a director where it was going, over GJ/length: keeps twist well posed and moves nothing.
-# That of a section's normal is over EI/length.
 HOLD = 1e-4
+"""Torque per angle that holds a director where it was going, over GJ/length: keeps twist well posed and moves nothing.
+That of a section's normal is over EI/length."""
 
 
 @dataclass(frozen=True)
@@ -177,34 +178,21 @@ def add_rod(
         },
     )
     check_yield(name, yield_curvature, yield_share, "EI")
-    for option, value, least in (("segments", segments, 2), ("turns", turns, None)):
-        if not isinstance(value, int | np.integer) or (least is not None and value < least):
-            wanted = "must be a whole number" + ("" if least is None else f" from {least} on")
-            fix = "give whole turns; grips give the rest" if least is None else f"give at least {least}"
-            raise SceneError(f"{name}.{option}", wanted, value, fix)
+    _check_whole(name, segments, turns)
     for label, damping, of, stiffness in (("stretch", stretch_damping, "EA", EA), ("shear", shear_damping, "GA", GA)):
         if damping is not None and stiffness is None:
             fix = f"give {of}, or leave it out"
             raise SceneError(f"{name}.{label}_damping", f"needs a finite {of}", stiffness, fix)
     ends = End(name, "start", -1.0, start), End(name, "end", 1.0, end)
-    for nuisance, asked in (("tilts", tilts), ("shifts", shifts)):
-        if asked and ends[0].grip is None and ends[1].grip is None:
-            raise SceneError(f"{name}.{nuisance}", "need a grip", asked, "give start or end")
-    if roll and ends[1].grip is None:
-        raise SceneError(f"{name}.roll", "needs a grip at the end", roll, "give end")
+    _check_grips(name, ends, tilts, shifts, roll)
     ring = _is_ring(name, ends, points, length)
     check_roll(name, hold_roll, [e.label for e in ends if e.held])
 
-    link = length / segments
-    places = [e.place(scene) for e in ends]
-    shared = [e.shared_node(scene) for e in ends]
-    shape, speeds = initial_shape(name, length, segments, points, velocity, places, EA is not None)
-    own = np.arange(int(shared[0] is not None), segments + int(shared[1] is None and not ring))
-    nodes = np.full(segments + 1, -1)
-    nodes[own] = scene.add_particles(shape[own], 0.0, None if speeds is None else speeds[own])
-    nodes[[0, -1]] = [nodes[k] if node is None else node for k, node in zip((0, -1), shared, strict=True)]
-    if ring:
-        nodes[-1] = nodes[0]
+    shape, speeds = initial_shape(
+        name, length, segments, points, velocity, [e.place(scene) for e in ends], EA is not None
+    )
+    nodes = _add_nodes(scene, ends, shape, speeds, ring)
+    line = Line(name, nodes, shape, length / segments, ring)
     scene.add_quantity(f"{name}_length", length, "m")
     scene.add_quantity(f"{name}_density", density, "kg/m")
     add_masses(scene, name, nodes, segments)
@@ -212,60 +200,90 @@ def add_rod(
     stretch = None
     if stretch_damping is not None:
         stretch = (1.0, {scene.add_quantity(f"{name}_stretch_damping", stretch_damping, "s"): "identity"})
-    add_links(scene, name, nodes, link, EA, stretch)
+    add_links(scene, name, nodes, line.link, EA, stretch)
 
-    along = [e.along(edge) for e, edge in zip(ends, (shape[1] - shape[0], shape[-1] - shape[-2]), strict=True)]
-    stubs = [e.stub(link) for e in ends]
-    ghosts = [
-        None if way is None else int(scene.add_hidden([at + stub * way], STUB_MASS * density * link)[0])
-        for way, at, stub in zip(along, (shape[0], shape[-1]), stubs, strict=True)
-    ]
-    chain = np.array([*(g for g in ghosts[:1] if g is not None), *nodes, *(g for g in ghosts[1:] if g is not None)])
-    first, last = (e.director(scene, way) for e, way in zip(ends, along, strict=True))
-    if first is None and director is not None:
-        first = finite(f"{name}.director", director, (3,), SceneError)
-    if ring and last is None and along[0] is not None and along[1] is not None:
-        first = any_across(along[0]) if first is None else first
-        last = carried(first - (first @ along[0]) * along[0], along[0], along[1][None])[0]
-    edges = np.stack([chain[:-1], chain[1:]], axis=1)
-    frames = initial_frames(name, scene.nodes[chain], first, last, turns)
-    normals = None if GA is None else scene.add_normals(edges)
-    directors = scene.add_directors(edges, frames, normals)
+    frames = add_frames(scene, line, ends, director, turns, GA is not None, STUB_MASS * density * line.link)
     scene.add_quantity(f"{name}_GJ", GJ, "N m^2")
-    hold = {f"{name}_GJ": "identity", f"{name}_length": "inverse"}
-    scene.add_terms([product("mass", d, HOLD, hold) for d in directors])
-    for e, k, ghost, stub in zip(ends, (0, -1), ghosts, stubs, strict=True):
-        e.hold_node(scene, int(nodes[k]))
-        if ghost is not None:
-            normal = None if normals is None else int(normals[k])
-            e.hold(scene, int(nodes[k]), ghost, int(directors[k]), normal, stub, tilts, shifts, roll and k == -1)
-        if e.label in hold_roll:
-            scene.pin([int(directors[k])])
-        if shifts and e.grip is not None:
-            share = np.linspace(float(k == 0), float(k == -1), len(nodes))
-            spread_shift(scene, e.grip, f"{name}_{e.label}", nodes[1:-1], share[1:-1])
-    if roll:
-        shares = np.linspace(0.0 if ends[0].held else 1.0, 1.0, len(directors))
-        spread_roll(scene, f"{name}_roll", directors[:-1], shares[:-1])
+    _hold_axes(scene, name, "GJ", frames.directors)
+    _hold_ends(scene, line, ends, frames, hold_roll, tilts, shifts, roll)
 
-    at = np.arange(1, len(chain) - 1)
-    axes = [chain[at - 1], chain[at], chain[at + 1]] if normals is None else [normals[at - 1], normals[at]]
-    before = int(ghosts[0] is not None)
-    joints = Joints(scene, name, np.stack([*axes, directors[at - 1], directors[at]], axis=1), at - before, segments)
+    joints = Joints(scene, name, frames.joints, frames.at - frames.first, segments)
     joints.bend(EI, EI2, bend_damping, yield_curvature, yield_share, softness_modes)
-    if normals is not None and GA is not None:
-        hold = {f"{name}_EI": "identity", f"{name}_length": "inverse"}
-        scene.add_terms([product("mass", n, HOLD, hold) for n in normals])
-        links = slice(before, before + segments)
-        shear(scene, name, np.column_stack([edges[links], normals[links], directors[links]]), GA, shear_damping)
+    if frames.normals is not None and GA is not None:
+        _hold_axes(scene, name, "EI", frames.normals)
+        shear(scene, name, frames.sections(segments), GA, shear_damping)
     joints.twist(twist_damping)
     joints.rest(curvature_modes, twist_modes)
     joints.slid(slid_modes)
     add_drag(scene, name, nodes, segments, drag_linear, drag_quadratic)
-    sections = np.zeros(0, dtype=int) if normals is None else normals
-    built = Rod(name, nodes, link * np.arange(segments + 1), ghosts[0], ghosts[1], directors, sections)
+    normals = np.zeros(0, dtype=int) if frames.normals is None else frames.normals
+    built = Rod(name, nodes, line.link * np.arange(segments + 1), *frames.ghosts, frames.directors, normals)
     scene.ropes[name] = built
     return built
+
+
+def _add_nodes(scene: Scene, ends: tuple[End, End], shape: Array, speeds: Array | None, ring: bool) -> Array:
+    """(segments + 1,) numbers of a rod's particles: new ones, but for those that a junction has already."""
+    shared = [e.shared_node(scene) for e in ends]
+    nodes = np.full(len(shape), -1)
+    own = np.arange(int(shared[0] is not None), len(shape) - 1 + int(shared[1] is None and not ring))
+    nodes[own] = scene.add_particles(shape[own], 0.0, None if speeds is None else speeds[own])
+    nodes[[0, -1]] = [nodes[k] if node is None else node for k, node in zip((0, -1), shared, strict=True)]
+    if ring:
+        nodes[-1] = nodes[0]
+    return nodes
+
+
+def _hold_axes(scene: Scene, name: str, stiffness: str, axes: Array) -> None:
+    """Hold hidden axes where they were going, see HOLD, by a share of a stiffness of the rod."""
+    hold = {f"{name}_{stiffness}": "identity", f"{name}_length": "inverse"}
+    scene.add_terms([product("mass", axis, HOLD, hold) for axis in axes])
+
+
+def _hold_ends(
+    scene: Scene,
+    line: Line,
+    ends: tuple[End, End],
+    frames: Frames,
+    hold_roll: Sequence[str],
+    tilts: bool,
+    shifts: bool,
+    roll: bool,
+) -> None:
+    """Hold the ends by their grips, junctions and bodies; spread shifts and roll of grips along the initial shape."""
+    nodes, normals = line.nodes, frames.normals
+    for e, k, ghost, stub in zip(ends, (0, -1), frames.ghosts, frames.stubs, strict=True):
+        node, director = int(nodes[k]), int(frames.directors[k])
+        e.hold_node(scene, node)
+        if ghost is not None:
+            normal = None if normals is None else int(normals[k])
+            e.hold(scene, node, ghost, director, normal, stub, tilts, shifts, roll and k == -1)
+        if e.label in hold_roll:
+            scene.pin([director])
+        if shifts and e.grip is not None:
+            share = np.linspace(float(k == 0), float(k == -1), len(nodes))
+            spread_shift(scene, e.grip, f"{line.name}_{e.label}", nodes[1:-1], share[1:-1])
+    if roll:
+        shares = np.linspace(0.0 if ends[0].held else 1.0, 1.0, len(frames.directors))
+        spread_roll(scene, f"{line.name}_roll", frames.directors[:-1], shares[:-1])
+
+
+def _check_whole(name: str, segments: int, turns: int) -> None:
+    """Raises SceneError where segments or turns are no whole numbers, or there are fewer than two segments."""
+    for option, value, least in (("segments", segments, 2), ("turns", turns, None)):
+        if not isinstance(value, int | np.integer) or (least is not None and value < least):
+            wanted = "must be a whole number" + ("" if least is None else f" from {least} on")
+            fix = "give whole turns; grips give the rest" if least is None else f"give at least {least}"
+            raise SceneError(f"{name}.{option}", wanted, value, fix)
+
+
+def _check_grips(name: str, ends: tuple[End, End], tilts: bool, shifts: bool, roll: bool) -> None:
+    """Raises SceneError where there is no grip whose pose could be off as is asked for."""
+    for nuisance, asked in (("tilts", tilts), ("shifts", shifts)):
+        if asked and ends[0].grip is None and ends[1].grip is None:
+            raise SceneError(f"{name}.{nuisance}", "need a grip", asked, "give start or end")
+    if roll and ends[1].grip is None:
+        raise SceneError(f"{name}.roll", "needs a grip at the end", roll, "give end")
 
 
 def _is_ring(name: str, ends: tuple[End, End], points: ArrayLike | None, length: float) -> bool:
