@@ -11,25 +11,22 @@ from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_positive, indices
 from ..errors import SceneError
-from ..quantities.quantities import Term, product
 from ..scene.body import BodyPoint
 from ..scene.scene import Array, Scene
 from .body_end import STUB
 from .chain import (
-    TimeConstant,
     add_drag,
     add_links,
     add_masses,
-    first_value,
     straight_or_given,
     straight_way,
     time_constants,
     unit_vector,
-    voronoi_shares,
 )
 from .grip import Grip
 from .rod_shape import initial_shape
-from .rope_grips import checked_grips, hold, lengthen, loosen, placed, ride
+from .rope_grips import checked_grips, clamp, hold, lengthen, loosen, placed, ride
+from .rope_joints import add_joints, check_set
 
 GHOST = 0.01  # length of a clamp's ghost link over a rope's link; only its direction matters
 
@@ -170,6 +167,15 @@ def add_rope(
     way = straight_way(direction, clamp_start, clamp_end)
     shape, length = straight_or_given(name, length, segments, start, way, points)
     grips = checked_grips(name, (grip_start, grip_end), (clamp_start, clamp_end))
+    gripped = [isinstance(grip, Grip) for grip in grips]
+    for field, asked, possible in (
+        ("tilts", tilts, any(gripped)),
+        ("shifts", shifts, any(gripped)),
+        ("start_lead", start_lead, gripped[0]),
+        ("end_lead", end_lead, gripped[1]),
+    ):
+        if asked and not possible:
+            raise SceneError(f"{name}.{field}", "needs a grip", asked, "give grip_start or grip_end")
     speeds = None
     if velocity is not None or any(grips):
         held = [None if grip is None else placed(grip) for grip in grips]
@@ -186,10 +192,7 @@ def add_rope(
         raise SceneError(
             f"{name}.plane", "is missing", None, "give the unit normal that the clamp angles or the set turn about"
         )
-    if any(k != int(k) or k < 0 for k in set_modes):
-        raise SceneError(f"{name}.set_modes", "must be whole numbers from 0 on", set_modes, "give such as (0, 1)")
-    if len(set_modes) and EI is None:
-        raise SceneError(f"{name}.set_modes", "need EI", EI, "give EI: a rest curvature acts through bending")
+    check_set(name, set_modes, EI)
 
     nodes = scene.add_particles(shape, 0.0, speeds)
     link = length / segments
@@ -200,119 +203,24 @@ def add_rope(
     add_masses(scene, name, nodes, segments)
     add_links(scene, name, nodes, link, EA, taus[0])
     ghosts = [
-        _clamp(scene, name, end, clamp, nodes, shape, link, normal if clamp_angles else None)
+        clamp(scene, name, end, held, int(nodes[k]), side * GHOST * link, normal if clamp_angles else None)
         if grip is None
-        else ride(scene, grip, f"{name}_{end}", int(nodes[k]), reach * STUB * link, GHOST * density * link)
+        else ride(scene, grip, f"{name}_{end}", int(nodes[k]), side * STUB * link, GHOST * density * link)
         if isinstance(grip, BodyPoint)
-        else hold(scene, grip, int(nodes[k]), reach * GHOST * link)
-        for end, clamp, grip, k, reach in (
+        else hold(scene, grip, int(nodes[k]), side * GHOST * link)
+        for end, held, grip, k, side in (
             ("start", clamp_start, grips[0], 0, -1.0),
             ("end", clamp_end, grips[1], -1, 1.0),
         )
     ]
-    if EI is not None:
-        _bending(scene, name, nodes, ghosts, arc, EI, taus[1], normal, set_modes)
-    add_drag(scene, name, nodes, segments, drag_linear, drag_quadratic)
     built = Rope(name, nodes, arc, *ghosts)
+    if EI is not None:
+        add_joints(scene, built, EI, taus[1], normal, set_modes)
+    add_drag(scene, name, nodes, segments, drag_linear, drag_quadratic)
     scene.ropes[name] = built
-    gripped = [isinstance(grip, Grip) for grip in grips]
-    for field, asked, possible in (
-        ("tilts", tilts, any(gripped)),
-        ("shifts", shifts, any(gripped)),
-        ("start_lead", start_lead, gripped[0]),
-        ("end_lead", end_lead, gripped[1]),
-    ):
-        if asked and not possible:
-            raise SceneError(f"{name}.{field}", "needs a grip", asked, "give grip_start or grip_end")
     for end, grip, ghost, lead in zip(("start", "end"), grips, ghosts, (start_lead, end_lead), strict=True):
         if isinstance(grip, Grip) and ghost is not None:
             loosen(scene, built, end, grip, ghost, GHOST * link, tilts, shifts)
             if lead is not None:
                 lengthen(scene, built, end, grip, ghost, lead, taus)
     return built
-
-
-def _clamp(
-    scene: Scene,
-    name: str,
-    end: str,
-    clamp: ArrayLike | None,
-    nodes: Array,
-    shape: Array,
-    link: float,
-    normal: Array | None,
-) -> int | None:
-    """Pin an end and hold its direction of travel by a ghost, a hidden node, behind the start or beyond the end."""
-    if clamp is None:
-        return None
-    along = unit_vector(f"{name}.clamp_{end}", clamp)
-    node, place, sign = (nodes[0], shape[0], -1.0) if end == "start" else (nodes[-1], shape[-1], 1.0)
-    reach = sign * GHOST * link
-    ghost = int(scene.add_hidden([place + reach * along], 1.0, pinned=True)[0])
-    scene.pin([node])
-    if normal is None:
-        return ghost
-    angle = scene.add_quantity(f"{name}_{end}_angle", 0.0, "rad", positive=False, scale=0.1)
-    across = np.cross(normal, along)
-    scene.add_terms(
-        [product("position", 3 * ghost + k, reach * along[k], {angle: "cos"}) for k in range(3)]
-        + [product("position", 3 * ghost + k, reach * across[k], {angle: "sin"}) for k in range(3)]
-    )
-    scene.shift_base(ghost, -reach * along)
-    return ghost
-
-
-def _bending(
-    scene: Scene,
-    name: str,
-    nodes: Array,
-    ghosts: list[int | None],
-    arc: Array,
-    EI: float,
-    damping: TimeConstant | None,
-    normal: Array | None,
-    set_modes: Sequence[int],
-) -> None:
-    """Joints at the inner nodes and at clamped ends; alpha = Voronoi length / EI. A clamped end counts the rope's own
-    half link."""
-    chain = [*([] if ghosts[0] is None else [ghosts[0]]), *nodes, *([] if ghosts[1] is None else [ghosts[1]])]
-    share = voronoi_shares(len(nodes) - 1)
-    at = list(range(1, len(nodes) - 1))
-    at = ([0] if ghosts[0] is not None else []) + at + ([len(nodes) - 1] if ghosts[1] is not None else [])
-    if not at:
-        raise SceneError(f"{name}.segments", "leave no joint to bend", len(nodes) - 1, "use at least 2 segments")
-    triples = np.array([chain[i : i + 3] for i in range(len(chain) - 2)])
-    group, length = f"{name}_bend", f"{name}_length"
-    ones = np.ones(len(at))
-    scene.add_constraints(
-        "planar_bend" if len(set_modes) else "bend",
-        triples,
-        name=group,
-        compliance=ones,
-        damping=None if damping is None else 0.0 * ones,
-        normal=normal if len(set_modes) else None,
-    )
-    scene.groups[-1].compliance[:] = 0.0
-    _, first, _ = scene.group(group)
-    stiffness = scene.add_quantity(f"{name}_EI", EI, "N m^2")
-    terms: list[Term] = [
-        product("compliance", first + i, share[node], {length: "identity", stiffness: "inverse"})
-        for i, node in enumerate(at)
-    ]
-    if damping is not None:
-        scale, tau = damping
-        factors = {**tau, stiffness: "identity", length: "inverse"}
-        terms += [product("damping", first + i, scale / share[node], factors) for i, node in enumerate(at)]
-    offset = first_value(scene, group)
-    for k in set_modes:
-        mode = scene.add_quantity(f"{name}_set_{k}", 0.0, "1/m", positive=False, scale=1.0 / arc[-1])
-        terms += [
-            product(
-                "rest",
-                offset + 4 * i + 3,
-                share[node] * np.cos(k * np.pi * arc[node] / arc[-1]),
-                {length: "identity", mode: "identity"},
-            )
-            for i, node in enumerate(at)
-        ]
-    scene.add_terms(terms)

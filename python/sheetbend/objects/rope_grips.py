@@ -1,4 +1,4 @@
-"""Ends of ropes in grips."""
+"""Ends of ropes in clamps, in grips and on bodies."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import SceneError
+from ..quantities.quantities import product
 from ..scene.body import BodyPoint
 from ..scene.in_frame import drive_in_frame
 from ..scene.scene import Array, Scene
 from .body_end import hold_place
-from .chain import TimeConstant, first_value, voronoi_shares
+from .chain import TimeConstant, first_value, unit_vector, voronoi_shares
 from .grip import Grip
 from .grip_freedom import Lead, add_shifts, add_tilts, spread_shift
 
@@ -64,6 +65,35 @@ def hold(scene: Scene, grip: Grip, node: int, reach: float) -> int:
         return ghost
     motion = np.stack([grip.position, grip.position + reach * grip.direction], axis=1)
     drive_in_frame(scene, grip.frame, [node, ghost], grip.times, motion)
+    return ghost
+
+
+def clamp(
+    scene: Scene, name: str, end: str, direction: ArrayLike | None, node: int, reach: float, normal: Array | None
+) -> int | None:
+    """Pin an end and hold its direction of travel by a ghost, a hidden node `reach` m along the rope from it.
+
+    Args:
+        name: of the rope.
+        end: "start" or "end".
+        direction: (3,), from start to end; None = not clamped.
+        node: the end.
+        normal: (3,) about which the new quantity `<name>_<end>_angle` turns the clamp; None = no such quantity.
+    """
+    if direction is None:
+        return None
+    along = unit_vector(f"{name}.clamp_{end}", direction)
+    ghost = int(scene.add_hidden([scene.nodes[node] + reach * along], 1.0, pinned=True)[0])
+    scene.pin([node])
+    if normal is None:
+        return ghost
+    angle = scene.add_quantity(f"{name}_{end}_angle", 0.0, "rad", positive=False, scale=0.1)
+    across = np.cross(normal, along)
+    scene.add_terms(
+        [product("position", 3 * ghost + k, reach * along[k], {angle: "cos"}) for k in range(3)]
+        + [product("position", 3 * ghost + k, reach * across[k], {angle: "sin"}) for k in range(3)]
+    )
+    scene.shift_base(ghost, -reach * along)
     return ghost
 
 

@@ -1,0 +1,79 @@
+"""The joints of a rope: bending, and the curvature at rest in the rope's plane."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import SceneError
+from ..quantities.quantities import Term, product
+from ..scene.scene import Array, Scene
+from .chain import TimeConstant, first_value, voronoi_shares
+from .rope_grips import Chain
+
+
+def check_set(name: str, modes: Sequence[int], EI: float | None) -> None:
+    """Raises SceneError where the modes of a rest curvature are no whole numbers, or nothing bends."""
+    if any(k != int(k) or k < 0 for k in modes):
+        raise SceneError(f"{name}.set_modes", "must be whole numbers from 0 on", modes, "give such as (0, 1)")
+    if len(modes) and EI is None:
+        raise SceneError(f"{name}.set_modes", "need EI", EI, "give EI: a rest curvature acts through bending")
+
+
+def add_joints(
+    scene: Scene, rope: Chain, EI: float, damping: TimeConstant | None, normal: Array | None, modes: Sequence[int]
+) -> None:
+    """Let a rope bend at its inner nodes and clamped ends; alpha = Voronoi length / EI.
+
+    A clamped end counts the rope's own half link.
+
+    Args:
+        EI: bending stiffness N m^2, the new quantity `<rope>_EI`.
+        damping: Kelvin-Voigt time constant; None = undamped.
+        normal: (3,) unit normal of the plane of the rest curvature.
+        modes: k of the modes cos(k pi s / length) of the rest curvature, new quantities `<rope>_set_<k>` 1/m.
+
+    Raises:
+        SceneError: a rope without a joint.
+    """
+    name, nodes, arc = rope.name, rope.particles, rope.arc_length
+    before, behind = ([] if ghost is None else [ghost] for ghost in (rope.start_ghost, rope.end_ghost))
+    chain = [*before, *nodes, *behind]
+    at = [*([0] if before else []), *range(1, len(nodes) - 1), *([len(nodes) - 1] if behind else [])]
+    if not at:
+        raise SceneError(f"{name}.segments", "leave no joint to bend", len(nodes) - 1, "use at least 2 segments")
+    group, length, ones = f"{name}_bend", f"{name}_length", np.ones(len(at))
+    scene.add_constraints(
+        "planar_bend" if len(modes) else "bend",
+        np.array([chain[i : i + 3] for i in range(len(chain) - 2)]),
+        name=group,
+        compliance=ones,
+        damping=None if damping is None else 0.0 * ones,
+        normal=normal if len(modes) else None,
+    )
+    scene.groups[-1].compliance[:] = 0.0
+    _, first, _ = scene.group(group)
+    share = voronoi_shares(len(nodes) - 1)
+    stiffness = scene.add_quantity(f"{name}_EI", EI, "N m^2")
+    terms: list[Term] = [
+        product("compliance", first + i, share[node], {length: "identity", stiffness: "inverse"})
+        for i, node in enumerate(at)
+    ]
+    if damping is not None:
+        scale, tau = damping
+        factors = {**tau, stiffness: "identity", length: "inverse"}
+        terms += [product("damping", first + i, scale / share[node], factors) for i, node in enumerate(at)]
+    offset = first_value(scene, group)
+    for k in modes:
+        mode = scene.add_quantity(f"{name}_set_{k}", 0.0, "1/m", positive=False, scale=1.0 / arc[-1])
+        terms += [
+            product(
+                "rest",
+                offset + 4 * i + 3,
+                share[node] * np.cos(k * np.pi * arc[node] / arc[-1]),
+                {length: "identity", mode: "identity"},
+            )
+            for i, node in enumerate(at)
+        ]
+    scene.add_terms(terms)
