@@ -400,3 +400,49 @@ def test_markers_with_the_name_of_a_body_are_not_on_the_rope(tmp_path: Path) -> 
     (rope,) = content["scene"].get("rope", content["scene"].get("rod"))
     assert "Hand" not in " ".join(rope["markers"])
     assert set(rope["grip"][0]["markers"]) == set(names[:4])
+
+
+def test_takes_of_one_rope_with_markers_of_their_own(tmp_path: Path) -> None:
+    """They were refused; and where markers that were put on anew kept their names, the longest distances of both takes
+    made one rope of 1.4 m."""
+    x = swinging(0.0)
+    share = {
+        "anew": np.array([0.0, 0.3, 1.1, 2.6, 3.2, 4.4, 5.3, 6.1, 7.7, 8.2, 9.6]),
+        "renamed": np.array([0.0, 1.5, 3.0, 4.5, 6.0, 7.5, 9.0]),
+    }
+    takes, t = [], np.arange(len(x)) / RATE
+    for name, at in {"first": np.arange(11.0), **share}.items():
+        k = np.minimum(at.astype(int), 9)
+        part = x[:, k] + (at - k)[:, None] * (x[:, k + 1] - x[:, k])
+        names = [f"m{j}" for j in range(len(at))]
+        if name == "renamed":  # from the free end on
+            names, part = [f"p{j}" for j in range(len(at))], part[:, ::-1]
+        part = part + np.random.default_rng(7).normal(0.0, NOISE, part.shape)
+        recording = sb.Recording(part, t, names, name=name)
+        recording.save(tmp_path / f"{name}.csv")
+        takes.append(Take(seen(recording), f"{name}.csv"))
+    found = draft(takes, "rope")
+    (tmp_path / "rope.toml").write_text(found.text)
+    content = tomllib.loads(found.text)
+    (rope,) = content["scene"].get("rope", content["scene"].get("rod"))
+    assert rope["length"] == pytest.approx(1.0, abs=0.01)
+    for part, (name, at) in zip(content["recording"][1:], share.items(), strict=True):
+        arcs = part["here"]["rope"]["markers"]
+        assert sorted(arcs.values()) == pytest.approx(0.1 * at, abs=3e-3)
+        assert sum(f"{name}.csv has markers of its own" in sentence for sentence in found.seen) == 1
+    assert content["recording"][2]["here"]["rope"]["grip"][0]["markers"] == ["p6"]
+    first, anew, renamed = build(parse(tmp_path / "rope.toml"), tmp_path).experiments
+    assert [len(e.places) for e in (first, anew, renamed)] == [11, 11, 7]
+    wrong = found.text.replace("[recording.here.rope.markers]", "[recording.here.robe.markers]", 1)
+    (tmp_path / "wrong.toml").write_text(wrong)
+    with pytest.raises(sb.ConfigError, match=r"recording\[1\]\.here names no rope of the scene"):
+        build(parse(tmp_path / "wrong.toml"), tmp_path)
+
+
+def test_takes_of_a_cloth_with_other_markers_are_refused(tmp_path: Path) -> None:
+    x, takes = shaken(grid(5, 8, 0.15, 0.0714)), []
+    for letter in "mp":
+        recording = sb.Recording(x, np.arange(len(x)) / RATE, [f"{letter}{k}" for k in range(40)], name=letter)
+        takes.append(Take(seen(recording), f"{letter}.csv"))
+    with pytest.raises(sb.RecordingError, match=r"of p\.csv differ from the first file's"):
+        draft(takes, "cloth")

@@ -37,12 +37,9 @@ def draft(takes: Sequence[Take], name: str, measured: Measured | None = None) ->
         RecordingError: recordings of different markers, or one that shows nothing that a model is for.
     """
     first = takes[0].seen
-    for take in takes[1:]:
-        if take.seen.recording.markers != first.recording.markers:
-            fix = "give recordings of the same markers, or make one configuration for each"
-            raise RecordingError("markers", f"of {take.file} differ from the first file's", take.file, fix)
+    own = [take.file for take in takes if take.seen.recording.markers != first.recording.markers]
     for model in (pendulum, flight, cantilever, cloth, gripped, rope):
-        found = model.describe(takes, measured or Measured())
+        found = model.describe(takes if not own or model is rope else takes[:1], measured or Measured())
         if found is not None:
             break
     else:
@@ -55,6 +52,9 @@ def draft(takes: Sequence[Take], name: str, measured: Measured | None = None) ->
         raise RecordingError(
             "markers", "do not move like a rope, beam, cloth, pendulum or a body in free flight", got, fix
         )
+    if own and model is not rope:
+        fix = "give recordings of the same markers, or make one configuration for each"
+        raise RecordingError("markers", f"of {joined(own)} differ from the first file's", found.kind, fix)
     if measured is not None and measured.poses is not None and model is not cloth:
         fix = "leave them out: a rope takes markers on what holds it"
         raise RecordingError("poses", "are for a cloth that a robot holds, and this is", found.kind, fix)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from .end_load import loaded_end
 from .held import Held, gripping, held, parts
 from .line import forks, plane, snapped, tangent
 from .lying import lies
+from .marked import Marked, marked_by, said_of
 from .seen import Seen
 from .take import Description, Measured, Take, max_gap
 from .text import joined, table
@@ -71,25 +71,24 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         )
         got = joined(s.recording.markers[k] for k in order)
         raise RecordingError("markers", "slide along at one height, as a rope on a floor or a table does", got, fix)
-    found = _at_rest(s, order) if s.static else held(s, hand, order)
+    found = _holding(s, hand, order)
     if len(found.order) < 3:
         return None
     pushed = None
     if s.rest and not s.static and not found.grips and len(takes) == 1:
         takes, pushed = _free(takes[0], found)
         s, r = takes[0].seen, takes[0].seen.recording
-    arc = _arcs(takes, found.order)
-    if found.grips and found.grips[0]["at"] == "start":
-        arc = arc + found.lead
-    length, measured_length, said_length = _length(s, found, float(arc[-1]), measured)
+    marked = marked_by(takes, found, _holding)
+    longest = max(marked, key=lambda own: own.arcs[-1])
+    length, measured_length, said_length = _length(s, longest, measured)
     if not measured_length and found.grips and found.grips[0]["at"] == "end":
         length += found.lead
-    arc = np.minimum(arc, length)
     density, said_density = _density(s, measured)
     names = r.markers
-    notes = [f"a rope through {joined(names[k] for k in order)}; {arc[-1]:.4g} m of it are free"]
+    far = f"{min(marked[0].arcs[-1], length):.4g} m"
+    notes = [f"a rope through {joined(names[k] for k in order)}; {far} of it are free"]
     if s.static:
-        notes = [f"a rope through {joined(names[k] for k in order)}, {arc[-1]:.4g} m from the first to the last"]
+        notes = [f"a rope through {joined(names[k] for k in order)}, {far} from the first to the last"]
     flat = plane(r.positions[:, list(order)], length) if s.static else None
     in_space = not s.static and plane(r.positions[:, list(order)], length) is None
     kind = "rod" if in_space and _can_be_rod(s, found) else "rope"
@@ -123,9 +122,7 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         step = float(np.median(np.diff(r.times)))
         lines += table("[solver]", {"substeps": max(1, int(np.ceil(step / SUBSTEP - 1e-9)))}, {"substeps": "per frame"})
     lines += table(f"[[scene.{kind}]]", rope | found.rope, why)
-    lines += table(
-        f"[scene.{kind}.markers]  # arc lengths in m", dict(zip((names[k] for k in found.order), arc, strict=True))
-    )
+    lines += table(f"[scene.{kind}.markers]  # arc lengths in m", marked[0].placed(length))
     load = None if s.static else loaded_end(s, found)
     if load is not None:
         at, mass = load[0], load[1] * density
@@ -137,17 +134,17 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         lines += table("[[scene.point_mass]]", {"name": "end", "particle": f"rope:{at}", "mass": mass}, {"mass": "kg"})
     for grip in found.grips:
         lines += table(f"[[scene.{kind}.grip]]", grip | ({"smoothing": 0.0} if estimated else {}))
-    for take in takes:
+    for here in marked:
+        take, r = here.take, here.take.seen.recording
         own = _recording(take, flat, "points" in rope) | {"driven_sigma": "estimate" if estimated else None}
-        r = take.seen.recording
-        driving = [r.markers.index(name) for grip in found.grips for name in grip["markers"]]
+        driving = [r.markers.index(name) for grip in here.held.grips for name in grip["markers"]]
         own["max_gap"] = max_gap(r.times, r.mask[:, driving])
         why = {
             "driven_sigma": "the fit estimates the hand's true motion",
             "held_out": "predicted, not fitted",
             "max_gap": "s, for which a marker of a grip is lost: closed by a cubic",
         }
-        lines += table("[[recording]]", own, why)
+        lines += table("[[recording]]", own, why) + (here.lines(length, estimated) if here is not marked[0] else [])
     for name, limits in _parameters(s.static, density, length, flat is not None, kind == "rod").items():
         lines += table(f"[parameters.{name}]", limits)
     if load is not None:
@@ -162,6 +159,8 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         lines += (
             table("[given.rope_length]", {"sd": LENGTH_SD}) if s.static else table("[parameters.rope_length]", prior)
         )
+    own_markers, held_there = said_of(marked)
+    notes, unknown = notes + own_markers, unknown + held_there
     if s.static and len(takes) > 1:
         lines += table("[fit]", {"leave_one_out": True}, {"leave_one_out": "predicts each shape from the others"})
     return Description("a rope" + (" at rest" if s.static else ""), [*notes, *found.notes], unknown, lines)
@@ -197,6 +196,10 @@ def _free(take: Take, found: Held) -> tuple[list[Take], str | None]:
     return [replace(take, seen=replace(s, recording=r.piece(start), rest=0.0))], said
 
 
+def _holding(s: Seen, hand: tuple[int, ...], order: tuple[int, ...]) -> Held:
+    return _at_rest(s, order) if s.static else held(s, hand, order)
+
+
 def _at_rest(s: Seen, order: tuple[int, ...]) -> Held:
     """Both ends of a shape at rest in clamps."""
     mean = mean_position(s.recording.positions)
@@ -205,20 +208,9 @@ def _at_rest(s: Seen, order: tuple[int, ...]) -> Held:
     return Held(order, clamps, notes=["nothing moves: a shape at rest"], unknown=unknown)
 
 
-def _arcs(takes: Sequence[Take], order: tuple[int, ...]) -> Array:
-    """(markers,) m along the rope. No chord is longer than its arc, so the longest ones count."""
-    pairs = list(pairwise(order))
-    chords = np.max([[take.seen.apart[a, b] for a, b in pairs] for take in takes], axis=0)
-    noise = max(take.seen.noise for take in takes)
-    if not takes[0].seen.static:
-        even = float(np.median(chords))
-        if len(chords) >= 4 and np.all(np.abs(chords - even) < 2.0 * noise):
-            chords = np.full(len(chords), even)  # all alike within their noise: the median is closer
-    return np.concatenate([[0.0], np.cumsum(chords)])
-
-
-def _length(s: Seen, found: Held, last: float, measured: Measured) -> tuple[float, bool, str]:
+def _length(s: Seen, longest: Marked, measured: Measured) -> tuple[float, bool, str]:
     """m, whether it was measured, and what is said of it."""
+    last = float(longest.arcs[-1])
     if measured.length is not None:
         if measured.length < 0.8 * last:
             problem = f"is shorter than the {last:.4g} m from the first to the last marker"
@@ -227,7 +219,8 @@ def _length(s: Seen, found: Held, last: float, measured: Measured) -> tuple[floa
     told = s.recording.metadata.get("length_m")
     if isinstance(told, int | float) and told >= 0.8 * last:
         return float(told), True, "whether the length that the file tells runs from the first to the last marker"
-    a, b = (s.recording.markers[k] for k in (found.order[0], found.order[-1]))
+    markers, order = longest.take.seen.recording.markers, longest.held.order
+    a, b = markers[order[0]], markers[order[-1]]
     return (
         last,
         False,
