@@ -121,11 +121,11 @@ def build(config: schema.Config, folder: Path, finer: int = 1) -> Study:
     return study
 
 
-def scene_alone(config: schema.Config, folder: Path = Path()) -> tuple[Scene, Solver]:
-    """The scene of a configuration without recordings, and its solver; files of meshes are relative to `folder`."""
+def scene_alone(config: schema.Config, folder: Path = Path(), finer: int = 1) -> tuple[Scene, Solver]:
+    """The scene of a configuration without recordings, and its solver; `folder` and `finer` as in `build`."""
     check_solver(config.scene, config.solver)
     tools = tools_of(config.scene, {}, None, 0.0, folder, "")
-    scene, _ = build_scene(config.experiment.name, config.scene, None, {}, folder=folder, tools=tools)
+    scene, _ = build_scene(config.experiment.name, config.scene, None, {}, finer, folder=folder, tools=tools)
     set_start_values(scene, config, {}, "")
     solver = solver_for(config.solver, None)
     with located("scene"):
