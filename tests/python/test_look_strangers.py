@@ -446,3 +446,28 @@ def test_takes_of_a_cloth_with_other_markers_are_refused(tmp_path: Path) -> None
         takes.append(Take(seen(recording), f"{letter}.csv"))
     with pytest.raises(sb.RecordingError, match=r"of p\.csv differ from the first file's"):
         draft(takes, "cloth")
+
+
+def test_other_things_beside_a_rope(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two ropes were drafted as one of 2.9 m, and a rope as held at its free end by a body that is 0.8 m away."""
+    monkeypatch.chdir(tmp_path)
+    x, t = swinging(0.0), np.arange(301) / RATE
+    x = x + np.random.default_rng(7).normal(0.0, NOISE, x.shape)
+    box = np.add([0.8, 0.0, 0.5], [[0.0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]])
+    body = box + 0.1 * np.sin(3.0 * t)[:, None, None] * [1.0, 0.0, 0.0]
+    ropes, boxes = ([f"{kind}{k}" for k in range(count)] for kind, count in (("r", 11), ("box", 4)))
+    sb.Recording(np.concatenate([x, body], axis=1), t, [*ropes, *boxes], name="both").save("both.csv")
+    sb.Recording(x, t, ropes, name="both").save("alone.csv")
+    other = [f"s{k}" for k in range(11)]
+    sb.Recording(np.concatenate([x, x * [1, -1, 1] + [0.5, 0.3, 0]], axis=1), t, [*ropes, *other]).save("two.csv")
+    scenes = []
+    for name, options in {"both": (), "alone": (), "two": ("--markers", "r*")}.items():
+        done = run("new", f"{name}.csv", "-o", f"{name}.toml", *options)
+        assert done.exit_code == 0, done.output
+        assert ("a rigid body far from the rope" in done.output) == (name == "both")
+        scenes.append(tomllib.loads(Path(f"{name}.toml").read_text())["scene"])
+    assert scenes[0] == scenes[1] == scenes[2]
+    refused = run("new", "two.csv", "-o", "none.toml")
+    assert refused.exit_code == 2 and "--markers 'r0,r1,r2," in refused.output and "two ropes" in refused.output
+    wrong = run("new", "two.csv", "-o", "none.toml", "--markers", "r*, q*")
+    assert wrong.exit_code == 2 and "(got 'q*')" in wrong.output

@@ -201,6 +201,9 @@ def _with_set(
     if len(np.unique(vertices)) < len(vertices):
         fix = "leave out all but one of them, or use a finer mesh"
         raise ConfigError(path, "has one vertex nearest to several", chosen.name, fix)
+    if chosen.radius is not None:
+        far = np.linalg.norm(mesh.vertices[:, None] - mesh.vertices[vertices], axis=2).min(axis=1)
+        vertices = np.flatnonzero(far <= chosen.radius * (1 + 1e-9))
     with located(path):
         return mesh.with_set(chosen.name, vertices)
 

@@ -12,9 +12,9 @@ from ..arrays.timeseries import mean_position
 from ..errors import RecordingError
 from .end_load import loaded_end
 from .held import Held, gripping, held, parts
-from .line import forks, plane, snapped, tangent
-from .lying import lies
+from .line import plane, snapped, tangent
 from .marked import Marked, marked_by, said_of
+from .one_rope import check_one_rope
 from .seen import Seen
 from .take import Description, Measured, Take, max_gap
 from .text import joined, table
@@ -25,7 +25,6 @@ SUBSTEP = 1 / 500  # s, at most
 BENDING = 0.15  # of the length: bending length (EI/(density g))^(1/3) at the start
 EARLY = 0.05  # s, in which the speed at the first frame is looked for
 SEGMENTS = 40  # of a rope, at least
-BRANCHED = 1.1  # times the shortest tree: how much longer the line through all markers of a branched cable is
 FITTED, LONGEST = 2 / 3, 3.0  # share of the time that is fitted, and s at most; the next third is predicted
 CLAMP_SD = 0.2  # rad, of the direction of a clamp, read off the first markers
 LENGTH_SD = 0.01  # relative, of a length that is a sum of distances between markers
@@ -64,13 +63,9 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     hand, order = parts(s)
     if len(order) < 3:
         return None
-    _unbranched(s, order)
-    if lies(s, order):
-        fix = (
-            "take the configuration in docs/tutorials/dragged_rope.md, with a table and its friction, for your markers"
-        )
-        got = joined(s.recording.markers[k] for k in order)
-        raise RecordingError("markers", "slide along at one height, as a rope on a floor or a table does", got, fix)
+    if len(hand) + len(order) < len(r.markers):
+        return _without_others(takes, measured, [r.markers[k] for k in sorted((*hand, *order))])
+    check_one_rope(s, order)
     found = _holding(s, hand, order)
     if len(found.order) < 3:
         return None
@@ -166,16 +161,14 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     return Description("a rope" + (" at rest" if s.static else ""), [*notes, *found.notes], unknown, lines)
 
 
-def _unbranched(s: Seen, order: tuple[int, ...]) -> None:
-    """Refuse markers of a branched cable: their shortest tree forks, and is much shorter than any line through them."""
-    at, longer = forks(s.apart, order)
-    if at and longer > BRANCHED:
-        raise RecordingError(
-            "markers",
-            "lie along a cable that branches, so one rope cannot go through all of them",
-            f"branches near {joined(s.recording.markers[k] for k in at)}",
-            "give a recording of one branch, or write one [[scene.rod]] for each, see docs/configuration.md",
-        )
+def _without_others(takes: Sequence[Take], measured: Measured, kept: list[str]) -> Description | None:
+    """The rope alone, where a rigid body far from it is in the same recording."""
+    alone = [replace(take, seen=take.seen.of(kept)) for take in takes]
+    found = describe(alone, measured)
+    if found is not None:
+        others = [name for name in takes[0].seen.recording.markers if name not in kept]
+        found.notes.append(f"{joined(others)} move as a rigid body far from the rope: they are left out")
+    return found
 
 
 def _free(take: Take, found: Held) -> tuple[list[Take], str | None]:
