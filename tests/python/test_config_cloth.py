@@ -155,6 +155,10 @@ def test_sets_by_box_points_and_markers(folder: Path) -> None:
     [[scene.cloth.set]]
     name = "tips"
     markers = ["b", "a"]
+    [[scene.cloth.set]]
+    name = "patch"
+    points = [[0.0, 0.0, 1.0]]
+    radius = 0.06
     [[scene.point_mass]]
     name = "hung"
     particle = "cloth:tips:1"
@@ -165,6 +169,8 @@ def test_sets_by_box_points_and_markers(folder: Path) -> None:
     x = {name: cloth.mesh.vertices[ids] for name, ids in cloth.mesh.sets.items()}
     assert len(x["right_half"]) == 9 and x["right_half"][:, 0].min() == pytest.approx(0.1)
     assert x["middle"] == pytest.approx(np.array([[0.1, 0, 1.05]]))
+    near = np.linalg.norm(cloth.mesh.vertices - [0.0, 0.0, 1.0], axis=1) <= 0.06
+    assert x["patch"] == pytest.approx(cloth.mesh.vertices[near]) and len(x["patch"]) == 3
     assert x["tips"] == pytest.approx(PLACED[[1, 0]])
     (heavy,) = (t.index for t in e.scene.terms if t.factors[0][0] == "hung_mass")
     assert e.scene.positions[heavy] == pytest.approx(PLACED[0])
@@ -385,6 +391,12 @@ BAD = [
     (MARKERS, "markers = { a = [0.3, 0.0] }", "scene.cloth[0].markers.a.points", "give points of the fabric"),
     (MARKERS, "nearest_at = 9.0", "scene.cloth[0].nearest_at", "0 to 0.2"),
     (TABLE, f'[[scene.cloth.set]]\nname = "s"\n{TABLE}', "scene.cloth[0].set[0]", "give one of"),
+    (
+        TABLE,
+        f'[[scene.cloth.set]]\nname = "s"\nlower = [0, 0, 0]\nradius = 0.1\n{TABLE}',
+        "scene.cloth[0].set[0]",
+        "leave out one of them",
+    ),
     (
         TABLE,
         f'[[scene.cloth.set]]\nname = "s"\nlower = [9, 9, 9]\n{TABLE}',

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -276,6 +277,21 @@ def test_a_flag_is_held_at_its_pole(tmp_path: Path, beside: float) -> None:
     assert any(f"the {side} row of markers" in sentence for sentence in found.seen)
 
 
+def test_a_curtain_hangs_from_its_rail(tmp_path: Path) -> None:
+    """The column of markers at its fixed end was taken for what holds it, as beside a pole; or its upper corners, since
+    the upper row is in folds."""
+    flat = grid(10, 6, 0.1, 0.12)
+    across, down = flat[:, 0], -flat[:, 1]
+    t = np.arange(301)[:, None] / RATE
+    pulled = 0.97 - 0.125 * (1.0 - np.cos(2.5 * np.maximum(t - 0.3, 0.0)))
+    folds = 0.3 / (2.0 * np.pi) * np.sqrt(2.0 * (1.0 - pulled**2)) * np.sin(2.0 * np.pi * across / 0.3)
+    sway = 0.06 * down**2 * np.sin(5.0 * t - 2.0 * down)
+    x = np.stack([pulled * across, folds + sway, 1.7 - down + 0.0 * t], axis=2)
+    _, content = drafted(tmp_path, x)
+    (cloth,) = content["scene"]["cloth"]
+    assert cloth["grip"] == [{"set": "top", "markers": [f"m{k}" for k in range(10)]}]
+
+
 def test_a_cloth_in_a_strong_wind_does_not_stand_on_its_edge(tmp_path: Path) -> None:
     """It leans so much that y was taken as up, and its upper edge for a lower one on which it stands."""
     flat = grid(5, 6, 0.1, 0.1)
@@ -375,6 +391,26 @@ def test_the_axis_that_points_up_is_told_or_guessed(tmp_path: Path) -> None:
     assert tomllib.loads(found.text)["scene"]["gravity"] == [0.0, 0.0, 9.81]
     content = tomllib.loads(draft([Take(seen(turned), "take.csv")], "take").text)
     assert "gravity" not in content["scene"]
+
+
+@pytest.mark.parametrize(("order", "options"), [("xzy", ["--up", "y"]), ("xzy", []), ("zyx", []), ("yxz", [])])
+def test_a_pendulum_in_another_plane_is_refused_with_the_way_to_turn_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, order: str, options: list[str]
+) -> None:
+    """One that hangs along x was drafted with gravity along z, and the others were no pendulum at all."""
+    monkeypatch.chdir(tmp_path)
+    t = np.arange(1001) / 200
+    angle = 0.6 * np.cos(5.0 * t)
+    end = np.stack([0.25 * np.sin(angle), 0.0 * t, -0.25 * np.cos(angle)], axis=1)
+    x = np.add([0.1, 0.4, 0.75], np.stack([0.0 * end, end], axis=1))
+    x = x + np.random.default_rng(3).normal(0.0, 2e-4, x.shape)
+    sb.Recording(x[:, :, ["xyz".index(axis) for axis in order]], t, name="take").save("take.csv")
+    refused = run("new", "take.csv", "-o", "take.toml", *options)
+    assert refused.exit_code == 2 and "sb.Recording.load('take.csv')" in refused.output
+    (script,) = re.findall(r"in Python: (.*)\.$", refused.output.strip())
+    exec(script, {"sb": sb})
+    again = run("new", "turned.csv", "-o", "take.toml")
+    assert again.exit_code == 0 and "looks like a pendulum" in again.output
 
 
 def test_a_pendulum_in_millimeters(tmp_path: Path) -> None:
