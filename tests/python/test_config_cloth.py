@@ -53,6 +53,7 @@ upper = 1e3
 [output]
 figures = "none"
 """
+AXIS, SPEED = "y_axis = [0, 0, 2]", 'velocity = "recording"'
 PLACED = np.array([[0.2, 0.0, 1.0], [0.2, 0.0, 1.1], [0.1, 0.0, 1.05]])  # of a, b and c at the start
 
 
@@ -471,3 +472,19 @@ def test_what_is_refused(folder: Path, old: str, new: str, field: str, fix: str)
         load(changed(folder, (old, new)))
     assert caught.value.field == field
     assert fix in f"{caught.value.problem}. {caught.value.fix}", str(caught.value)
+
+
+def test_a_cloth_that_moves_at_the_start(folder: Path) -> None:
+    """Markers of a sheet that turns about its pinned side: every vertex has the speed of that turn."""
+    speed = 0.4 * np.arange(13)[:, None] / 60
+    x = sb.Recording.load(folder / "sheet.npz").positions[0]
+    moving = np.repeat(x[None], 13, axis=0)
+    moving[..., 1] += speed * x[:, 0] / 0.2
+    sb.Recording(moving, np.arange(13) / 60, ("a", "b", "c"), name="sheet").save(folder / "sheet.npz")
+    late = ("[[recording]]", "[[recording]]\nfit = [0.1, 0.2]")
+    (e,) = load(changed(folder, late, (AXIS, f"{AXIS}\n{SPEED}"))).experiments
+    found = e.scene.base_arrays()["velocity"].reshape(-1, 3)
+    true = np.outer(e.scene.positions[:, 0] / 0.2, [0.0, 0.4, 0.0])
+    assert found[: len(true)] == pytest.approx(true, abs=1e-9)
+    with pytest.raises(sb.ConfigError, match=r"scene\.cloth\[0\]\.velocity: belongs to a motion"):
+        load(changed(folder, ("sigma = 1e-4", "sigma = 1e-4\nstatic = true"), (AXIS, f"{AXIS}\n{SPEED}")))

@@ -57,6 +57,10 @@ def test_a_corner_of_a_cloth_that_is_lost_for_a_moment(tmp_path: Path) -> None:
     x[200:206, 0] = np.nan
     _, content = drafted(tmp_path, x)
     assert 0.06 < content["recording"][0]["max_gap"] < 0.1
+    assert "velocity" not in content["scene"]["cloth"][0]
+    found, content = drafted(tmp_path, x[120:])  # cut while it moves
+    assert content["scene"]["cloth"][0]["velocity"] == "recording"
+    assert sum("speeds at the start are those of the markers" in sentence for sentence in found.seen) == 1
 
 
 def gathered(frames: int = 301) -> np.ndarray:

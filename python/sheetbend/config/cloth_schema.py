@@ -276,6 +276,10 @@ class Cloth(Section):
         "shape that a recording's scene starts from: as placed, or smoothly through the markers on it, as first "
         "measured (their mean when static)",
     )
+    velocity: Literal["recording"] | None = key(
+        None, 'initial velocity: "recording" takes that of the markers on it; at rest when left out'
+    )
+    smoothing: Finite = key(0.05, "over which markers are smoothed for `velocity`", "s", gt=0)
 
     @field_validator("markers")
     @classmethod

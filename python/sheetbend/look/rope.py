@@ -10,6 +10,7 @@ import numpy as np
 
 from ..arrays.timeseries import mean_position
 from ..errors import RecordingError
+from .beginning import lets_go
 from .end_load import loaded_end
 from .held import Held, gripping, held, parts
 from .line import plane, snapped, tangent
@@ -23,7 +24,6 @@ from .unseen import free_from
 Array = np.ndarray
 SUBSTEP = 1 / 500  # s, at most
 BENDING = 0.15  # of the length: bending length (EI/(density g))^(1/3) at the start
-EARLY = 0.05  # s, in which the speed at the first frame is looked for
 SEGMENTS = 40  # of a rope, at least
 FITTED, LONGEST = 2 / 3, 3.0  # share of the time that is fitted, and s at most; the next third is predicted
 CLAMP_SD = 0.2  # rad, of the direction of a clamp, read off the first markers
@@ -294,7 +294,7 @@ def _beginning(s: Seen, found: Held, rope: dict[str, Any], rod: bool) -> list[st
         del rope["points"]
         rope["direction"] = _straight(s, found.order)
         return [f"it hangs straight and rests for the first {s.rest:.2g} s"]
-    if not _lets_go(s, found.order):
+    if not lets_go(s, found.order):
         rope["velocity"] = "recording"
         return ["it moves at the first frame: place and speed at the start are those of the markers"]
     notes = ["at the first frame it moves no faster than its noise: it starts from rest"]
@@ -306,20 +306,6 @@ def _beginning(s: Seen, found: Held, rope: dict[str, Any], rod: bool) -> list[st
             found.rope["clamp_start"] = way
         notes.append("at the first frame it is straight within its noise")
     return notes
-
-
-def _lets_go(s: Seen, order: tuple[int, ...]) -> bool:
-    """Whether the speeds at the first frame are within what noise makes of none: the rope is let go there. The slope
-    of a parabola through N frames in the time T has the standard deviation sigma sqrt(192 / N) / T at its end."""
-    r = s.recording
-    t = r.times - r.times[0]
-    early = np.flatnonzero(t <= EARLY)
-    x = r.positions[early][:, list(order)]
-    x = x[:, np.isfinite(x).all(axis=(0, 2))]
-    if len(early) < 6 or not x.shape[1] or not s.noise:
-        return False
-    slope = np.linalg.lstsq(np.vander(t[early], 3, increasing=True), x.reshape(len(early), -1), rcond=None)[0][1]
-    return bool(np.abs(slope).max() < 4.0 * s.noise * np.sqrt(192 / len(early)) / t[early[-1]])
 
 
 def _straight(s: Seen, order: tuple[int, ...]) -> list[float] | None:
