@@ -150,8 +150,9 @@ def test_the_end_that_moves_first_is_held(tmp_path: Path) -> None:
     assert any("m10 is the end that moves first" in sentence for sentence in found.seen)
 
 
-def swinging(mass: float, density: float = 0.05) -> np.ndarray:
-    """A chain of 10 links from a hand that stays for 0.4 s and then swings, with a mass at its end; 11 markers."""
+def swinging(mass: float, density: float = 0.05, let_go: float = 9.0) -> np.ndarray:
+    """A chain of 10 links from a hand that stays for 0.4 s and then swings, with a mass at its end; 11 markers. At last
+    (s) the hand lets go."""
     links, length, step, stride = 10, 1.0, 5e-4, 20
     link = length / links
     m = np.full(links + 1, density * link)
@@ -172,7 +173,8 @@ def swinging(mass: float, density: float = 0.05) -> np.ndarray:
         t = max((k + 1) * step - 0.4, 0.0)
         ease = t / (0.3 + t)
         hand = 0.1 * ease * np.array([np.sin(5.0 * t), 0.6 * np.sin(3.1 * t), 0.0])
-        v[0] = (hand - x[0]) / step
+        if t + 0.4 < let_go:
+            v[0] = (hand - x[0]) / step
         x = x + step * v
         if (k + 1) % stride == 0:
             kept.append(x)
@@ -440,6 +442,11 @@ def test_markers_with_the_name_of_a_body_are_not_on_the_rope(tmp_path: Path) -> 
     (rope,) = content["scene"].get("rope", content["scene"].get("rod"))
     assert "Hand" not in " ".join(rope["markers"])
     assert set(rope["grip"][0]["markers"]) == set(names[:4])
+    moved = Take(seen(sb.Recording(x + [1.0, 0.0, 0.0], np.arange(len(x)) / RATE, names, name="moved")), "moved.csv")
+    _, other = tomllib.loads(draft([take, moved], "take").text)["recording"]  # its grip has a place of its own
+    (grip,) = other["here"]["rope"]["grip"]
+    assert "markers" not in other["here"]["rope"]
+    assert np.subtract(grip["position"], rope["grip"][0]["position"]) == pytest.approx([1.0, 0.0, 0.0], abs=1e-5)
 
 
 def test_takes_of_one_rope_with_markers_of_their_own(tmp_path: Path) -> None:
@@ -475,7 +482,7 @@ def test_takes_of_one_rope_with_markers_of_their_own(tmp_path: Path) -> None:
     assert [len(e.places) for e in (first, anew, renamed)] == [11, 11, 7]
     wrong = found.text.replace("[recording.here.rope.markers]", "[recording.here.robe.markers]", 1)
     (tmp_path / "wrong.toml").write_text(wrong)
-    with pytest.raises(sb.ConfigError, match=r"recording\[1\]\.here names no rope of the scene"):
+    with pytest.raises(sb.ConfigError, match=r"recording\[1\]\.here: names no rope of the scene"):
         build(parse(tmp_path / "wrong.toml"), tmp_path)
 
 
@@ -511,3 +518,13 @@ def test_other_things_beside_a_rope(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert refused.exit_code == 2 and "--markers 'r0,r1,r2," in refused.output and "two ropes" in refused.output
     wrong = run("new", "two.csv", "-o", "none.toml", "--markers", "r*, q*")
     assert wrong.exit_code == 2 and "(got 'q*')" in wrong.output
+
+
+def test_a_rope_that_is_let_go(tmp_path: Path) -> None:
+    """Its fall was fitted and predicted too, as the motion of a hand that goes down with gravity."""
+    found, content = drafted(tmp_path, swinging(0.0, let_go=2.2))
+    (recording,) = content["recording"]
+    assert recording["held_out"][1] == pytest.approx(2.2, abs=0.04)
+    assert any("it falls freely from 2.1" in s or "it falls freely from 2.2" in s for s in found.seen)
+    whole, _ = drafted(tmp_path, swinging(0.0))
+    assert not any("falls freely" in s for s in whole.seen)

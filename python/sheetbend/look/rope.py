@@ -16,6 +16,7 @@ from .held import Held, gripping, held, parts
 from .line import plane, snapped, tangent
 from .marked import Marked, marked_by, said_of
 from .one_rope import check_one_rope
+from .released import released
 from .seen import Seen
 from .take import Description, Measured, Take, max_gap
 from .text import joined, table
@@ -32,6 +33,7 @@ SET_MODES, SET_SD = (1, 2, 3, 4), 10.0  # of the rest curvature of shapes at res
 ROUND = 0.75  # GJ/EI of a round solid section with a Poisson ratio of 1/3
 LEAST_SIGMA = 1e-4  # m, of the markers of a motion: a model misses by as much
 NUMBERS = 1500  # of a hand's motion, three for every fitted frame: so many are estimated in minutes
+LEAST_HELD = 30  # frames before a rope is let go
 LEAST_FREE = 0.2  # of a recording: how much is left at least where its beginning is cut off
 HOLDER_SD = 0.5  # rad, of a clamp of a shape at rest, read off the markers of the same shape
 
@@ -65,6 +67,8 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         return None
     if len(hand) + len(order) < len(r.markers):
         return _without_others(takes, measured, [r.markers[k] for k in sorted((*hand, *order))])
+    if not s.static and len(takes) == 1 and (let_go := released(s, order)) is not None:
+        return _while_held(takes[0], measured, let_go)
     check_one_rope(s, order)
     found = _holding(s, hand, order)
     if len(found.order) < 3:
@@ -163,11 +167,24 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
 
 def _without_others(takes: Sequence[Take], measured: Measured, kept: list[str]) -> Description | None:
     """The rope alone, where a rigid body far from it is in the same recording."""
-    alone = [replace(take, seen=take.seen.of(kept)) for take in takes]
+    alone = [replace(take, seen=take.seen.of(take.seen.recording.select(kept))) for take in takes]
     found = describe(alone, measured)
     if found is not None:
         others = [name for name in takes[0].seen.recording.markers if name not in kept]
         found.notes.append(f"{joined(others)} move as a rigid body far from the rope: they are left out")
+    return found
+
+
+def _while_held(take: Take, measured: Measured, let_go: float) -> Description | None:
+    """The rope up to the time, s, at which it is let go, where that is long enough to tell something."""
+    r = take.seen.recording
+    if (r.times < let_go).sum() < LEAST_HELD:
+        return None
+    found = describe([replace(take, seen=take.seen.of(r.piece(float(r.times[0]), let_go)))], measured)
+    if found is not None:
+        found.notes.append(
+            f"it falls freely from {let_go:.3g} s on: what holds it lets go, and only the time before is used"
+        )
     return found
 
 

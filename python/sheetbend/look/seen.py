@@ -74,9 +74,9 @@ class Seen:
             return np.asarray(self.recording.gravity)
         return np.where(np.arange(3) == self.up, -EARTH, 0.0)
 
-    def of(self, markers: list[str]) -> Seen:
-        """What some of the markers show alone."""
-        return replace(seen(self.recording.select(markers)), up=self.up, up_by=self.up_by)
+    def of(self, part: Recording) -> Seen:
+        """What a part of the recording shows alone: some of its markers, or of its time."""
+        return replace(seen(part), up=self.up, up_by=self.up_by)
 
 
 def seen(recording: Recording, up: str | None = None) -> Seen:
