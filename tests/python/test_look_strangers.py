@@ -386,6 +386,18 @@ def test_a_rope_on_a_floor_is_refused_with_where_its_configuration_is(tmp_path: 
         drafted(tmp_path, x)
 
 
+def test_a_recording_that_shows_too_little(tmp_path: Path) -> None:
+    """It was said that two markers do not move like a rope; of 10 frames per second nothing was said."""
+    x = swinging(0.0)
+    with pytest.raises(sb.RecordingError, match=r"are too few.*three or more on a rope"):
+        drafted(tmp_path, x[:, [0, 10]])
+    found, _ = drafted(tmp_path, x[::10], RATE / 10)
+    (said,) = [sentence for sentence in found.seen if "between two frames" in sentence]
+    assert "0.19 m" in said or "0.2 m" in said
+    found, _ = drafted(tmp_path, x[::2], RATE / 2)
+    assert not any("between two frames" in sentence for sentence in found.seen)
+
+
 def test_the_axis_that_points_up_is_told_or_guessed(tmp_path: Path) -> None:
     found, _ = drafted(tmp_path, kicked())
     (said,) = [sentence for sentence in found.seen if "is taken as up" in sentence]
@@ -442,7 +454,9 @@ def test_markers_with_the_name_of_a_body_are_not_on_the_rope(tmp_path: Path) -> 
     (rope,) = content["scene"].get("rope", content["scene"].get("rod"))
     assert "Hand" not in " ".join(rope["markers"])
     assert set(rope["grip"][0]["markers"]) == set(names[:4])
-    moved = Take(seen(sb.Recording(x + [1.0, 0.0, 0.0], np.arange(len(x)) / RATE, names, name="moved")), "moved.csv")
+    moved = Take(
+        seen(sb.Recording(np.add(x, [1.0, 0.0, 0.0]), np.arange(len(x)) / RATE, names, name="moved")), "moved.csv"
+    )
     _, other = tomllib.loads(draft([take, moved], "take").text)["recording"]  # its grip has a place of its own
     (grip,) = other["here"]["rope"]["grip"]
     assert "markers" not in other["here"]["rope"]
