@@ -303,6 +303,10 @@ class TestSimulate:
             np.testing.assert_allclose(saved["times"], np.arange(31) / 100, atol=1e-12)
             assert saved["force_rope_stretch"].shape == (31, 6, 1)
         assert found["frames"] == 31 and found["particles"] == 7
+        marker = sb.Recording.load("sim/predicted_swing.npz").positions
+        finer = last_line(run("simulate", config, "--json", "--output", "fine", "--finer"))["simulated"]["swing"]
+        off = np.abs(sb.Recording.load("fine/predicted_swing.npz").positions - marker)
+        assert finer["particles"] == 13 and 0.0 < off.max() < 0.05  # other links, the same markers
 
     def test_equilibrium(self, config: Path) -> None:
         edited(config, "held_out = [0.2, 0.31]", "static = true")
@@ -322,6 +326,8 @@ class TestSimulate:
         config.write_text(text[: text.index("[[recording]]")].replace("substeps = 4", "h = 0.002"))
         found = last_line(run("simulate", config, "--json", "--duration", "0.1"))["simulated"]["swing"]
         assert found["frames"] == 11 and found["duration"] == pytest.approx(0.1)
+        finer = last_line(run("simulate", config, "--json", "--duration", "0.1", "--finer"))["simulated"]["swing"]
+        assert (found["particles"], finer["particles"]) == (7, 13)
 
     @pytest.mark.parametrize(
         ("options", "field"),

@@ -231,5 +231,6 @@ def test_a_scene_with_one_cloth() -> None:
     assert made.quantities == by_hand.quantities and made.pinned == by_hand.pinned
     assert np.array_equal(made.compiled.inputs(), by_hand.compiled.inputs())
     assert list(made.cloths) == ["towel"]
+    assert not sb.cloth(mesh, density=0.2, warp=60, shear=4).pinned  # one that falls
     with pytest.raises(sb.SceneError, match=re.escape("cloth.pinned")):
         sb.cloth(mesh, density=0.2, warp=60, shear=4, pinned=[10_000])

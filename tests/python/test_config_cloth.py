@@ -53,6 +53,7 @@ upper = 1e3
 [output]
 figures = "none"
 """
+AXIS, SPEED = "y_axis = [0, 0, 2]", 'velocity = "recording"'
 PLACED = np.array([[0.2, 0.0, 1.0], [0.2, 0.0, 1.1], [0.1, 0.0, 1.05]])  # of a, b and c at the start
 
 
@@ -155,6 +156,10 @@ def test_sets_by_box_points_and_markers(folder: Path) -> None:
     [[scene.cloth.set]]
     name = "tips"
     markers = ["b", "a"]
+    [[scene.cloth.set]]
+    name = "patch"
+    points = [[0.0, 0.0, 1.0]]
+    radius = 0.06
     [[scene.point_mass]]
     name = "hung"
     particle = "cloth:tips:1"
@@ -165,6 +170,8 @@ def test_sets_by_box_points_and_markers(folder: Path) -> None:
     x = {name: cloth.mesh.vertices[ids] for name, ids in cloth.mesh.sets.items()}
     assert len(x["right_half"]) == 9 and x["right_half"][:, 0].min() == pytest.approx(0.1)
     assert x["middle"] == pytest.approx(np.array([[0.1, 0, 1.05]]))
+    near = np.linalg.norm(cloth.mesh.vertices - [0.0, 0.0, 1.0], axis=1) <= 0.06
+    assert x["patch"] == pytest.approx(cloth.mesh.vertices[near]) and len(x["patch"]) == 3
     assert x["tips"] == pytest.approx(PLACED[[1, 0]])
     (heavy,) = (t.index for t in e.scene.terms if t.factors[0][0] == "hung_mass")
     assert e.scene.positions[heavy] == pytest.approx(PLACED[0])
@@ -387,6 +394,12 @@ BAD = [
     (TABLE, f'[[scene.cloth.set]]\nname = "s"\n{TABLE}', "scene.cloth[0].set[0]", "give one of"),
     (
         TABLE,
+        f'[[scene.cloth.set]]\nname = "s"\nlower = [0, 0, 0]\nradius = 0.1\n{TABLE}',
+        "scene.cloth[0].set[0]",
+        "leave out one of them",
+    ),
+    (
+        TABLE,
         f'[[scene.cloth.set]]\nname = "s"\nlower = [9, 9, 9]\n{TABLE}',
         "scene.cloth[0].set[0]",
         "choose within the cloth's own box",
@@ -459,3 +472,19 @@ def test_what_is_refused(folder: Path, old: str, new: str, field: str, fix: str)
         load(changed(folder, (old, new)))
     assert caught.value.field == field
     assert fix in f"{caught.value.problem}. {caught.value.fix}", str(caught.value)
+
+
+def test_a_cloth_that_moves_at_the_start(folder: Path) -> None:
+    """Markers of a sheet that turns about its pinned side: every vertex has the speed of that turn."""
+    speed = 0.4 * np.arange(13)[:, None] / 60
+    x = sb.Recording.load(folder / "sheet.npz").positions[0]
+    moving = np.repeat(x[None], 13, axis=0)
+    moving[..., 1] += speed * x[:, 0] / 0.2
+    sb.Recording(moving, np.arange(13) / 60, ("a", "b", "c"), name="sheet").save(folder / "sheet.npz")
+    late = ("[[recording]]", "[[recording]]\nfit = [0.1, 0.2]")
+    (e,) = load(changed(folder, late, (AXIS, f"{AXIS}\n{SPEED}"))).experiments
+    found = e.scene.base_arrays()["velocity"].reshape(-1, 3)
+    true = np.outer(e.scene.positions[:, 0] / 0.2, [0.0, 0.4, 0.0])
+    assert found[: len(true)] == pytest.approx(true, abs=1e-9)
+    with pytest.raises(sb.ConfigError, match=r"scene\.cloth\[0\]\.velocity: belongs to a motion"):
+        load(changed(folder, ("sigma = 1e-4", "sigma = 1e-4\nstatic = true"), (AXIS, f"{AXIS}\n{SPEED}")))

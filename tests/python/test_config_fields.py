@@ -99,6 +99,7 @@ WHOLE: dict[str, Any] = {
         {
             "file": "r.npz",
             "marker": [{"marker": "m0", "particle": "a"}],
+            "here": {"NAME": {"grip": [{"at": "start", "markers": ["m0"]}]}},
             "grids": {"NAME": {"first": [0, 0], "last": [0.1, 0.1], "counts": [2, 2]}},
             "force": [{"file": "f.csv", "at": ["a"], "sigma": 0.1}],
         }

@@ -541,7 +541,7 @@ def test_a_rope_of_another_simulator_in_two_commands(tmp_path: Path) -> None:
 def test_the_tutorial_runs_as_it_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its script, its commands, what it shows of their output, and its table."""
     text = (ROOT / "docs/tutorials/one_hand.md").read_text()
-    blocks = dict(re.findall(r"```(python|sh|text)\n(.*?)```", text, re.S))
+    blocks = dict(reversed(re.findall(r"```(python|sh|text)\n(.*?)```", text, re.S)))  # the first of each kind
     monkeypatch.chdir(tmp_path)
     exec(compile(blocks["python"], "tutorial", "exec"), {})
     new, fit = (line.split()[1:] for line in blocks["sh"].splitlines())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -56,6 +57,10 @@ def test_a_corner_of_a_cloth_that_is_lost_for_a_moment(tmp_path: Path) -> None:
     x[200:206, 0] = np.nan
     _, content = drafted(tmp_path, x)
     assert 0.06 < content["recording"][0]["max_gap"] < 0.1
+    assert "velocity" not in content["scene"]["cloth"][0]
+    found, content = drafted(tmp_path, x[120:])  # cut while it moves
+    assert content["scene"]["cloth"][0]["velocity"] == "recording"
+    assert sum("speeds at the start are those of the markers" in sentence for sentence in found.seen) == 1
 
 
 def gathered(frames: int = 301) -> np.ndarray:
@@ -145,8 +150,9 @@ def test_the_end_that_moves_first_is_held(tmp_path: Path) -> None:
     assert any("m10 is the end that moves first" in sentence for sentence in found.seen)
 
 
-def swinging(mass: float, density: float = 0.05) -> np.ndarray:
-    """A chain of 10 links from a hand that stays for 0.4 s and then swings, with a mass at its end; 11 markers."""
+def swinging(mass: float, density: float = 0.05, let_go: float = 9.0) -> np.ndarray:
+    """A chain of 10 links from a hand that stays for 0.4 s and then swings, with a mass at its end; 11 markers. At last
+    (s) the hand lets go."""
     links, length, step, stride = 10, 1.0, 5e-4, 20
     link = length / links
     m = np.full(links + 1, density * link)
@@ -167,7 +173,8 @@ def swinging(mass: float, density: float = 0.05) -> np.ndarray:
         t = max((k + 1) * step - 0.4, 0.0)
         ease = t / (0.3 + t)
         hand = 0.1 * ease * np.array([np.sin(5.0 * t), 0.6 * np.sin(3.1 * t), 0.0])
-        v[0] = (hand - x[0]) / step
+        if t + 0.4 < let_go:
+            v[0] = (hand - x[0]) / step
         x = x + step * v
         if (k + 1) % stride == 0:
             kept.append(x)
@@ -276,6 +283,21 @@ def test_a_flag_is_held_at_its_pole(tmp_path: Path, beside: float) -> None:
     assert any(f"the {side} row of markers" in sentence for sentence in found.seen)
 
 
+def test_a_curtain_hangs_from_its_rail(tmp_path: Path) -> None:
+    """The column of markers at its fixed end was taken for what holds it, as beside a pole; or its upper corners, since
+    the upper row is in folds."""
+    flat = grid(10, 6, 0.1, 0.12)
+    across, down = flat[:, 0], -flat[:, 1]
+    t = np.arange(301)[:, None] / RATE
+    pulled = 0.97 - 0.125 * (1.0 - np.cos(2.5 * np.maximum(t - 0.3, 0.0)))
+    folds = 0.3 / (2.0 * np.pi) * np.sqrt(2.0 * (1.0 - pulled**2)) * np.sin(2.0 * np.pi * across / 0.3)
+    sway = 0.06 * down**2 * np.sin(5.0 * t - 2.0 * down)
+    x = np.stack([pulled * across, folds + sway, 1.7 - down + 0.0 * t], axis=2)
+    _, content = drafted(tmp_path, x)
+    (cloth,) = content["scene"]["cloth"]
+    assert cloth["grip"] == [{"set": "top", "markers": [f"m{k}" for k in range(10)]}]
+
+
 def test_a_cloth_in_a_strong_wind_does_not_stand_on_its_edge(tmp_path: Path) -> None:
     """It leans so much that y was taken as up, and its upper edge for a lower one on which it stands."""
     flat = grid(5, 6, 0.1, 0.1)
@@ -364,6 +386,18 @@ def test_a_rope_on_a_floor_is_refused_with_where_its_configuration_is(tmp_path: 
         drafted(tmp_path, x)
 
 
+def test_a_recording_that_shows_too_little(tmp_path: Path) -> None:
+    """It was said that two markers do not move like a rope; of 10 frames per second nothing was said."""
+    x = swinging(0.0)
+    with pytest.raises(sb.RecordingError, match=r"are too few.*three or more on a rope"):
+        drafted(tmp_path, x[:, [0, 10]])
+    found, _ = drafted(tmp_path, x[::10], RATE / 10)
+    (said,) = [sentence for sentence in found.seen if "between two frames" in sentence]
+    assert "0.19 m" in said or "0.2 m" in said
+    found, _ = drafted(tmp_path, x[::2], RATE / 2)
+    assert not any("between two frames" in sentence for sentence in found.seen)
+
+
 def test_the_axis_that_points_up_is_told_or_guessed(tmp_path: Path) -> None:
     found, _ = drafted(tmp_path, kicked())
     (said,) = [sentence for sentence in found.seen if "is taken as up" in sentence]
@@ -375,6 +409,26 @@ def test_the_axis_that_points_up_is_told_or_guessed(tmp_path: Path) -> None:
     assert tomllib.loads(found.text)["scene"]["gravity"] == [0.0, 0.0, 9.81]
     content = tomllib.loads(draft([Take(seen(turned), "take.csv")], "take").text)
     assert "gravity" not in content["scene"]
+
+
+@pytest.mark.parametrize(("order", "options"), [("xzy", ["--up", "y"]), ("xzy", []), ("zyx", []), ("yxz", [])])
+def test_a_pendulum_in_another_plane_is_refused_with_the_way_to_turn_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, order: str, options: list[str]
+) -> None:
+    """One that hangs along x was drafted with gravity along z, and the others were no pendulum at all."""
+    monkeypatch.chdir(tmp_path)
+    t = np.arange(1001) / 200
+    angle = 0.6 * np.cos(5.0 * t)
+    end = np.stack([0.25 * np.sin(angle), 0.0 * t, -0.25 * np.cos(angle)], axis=1)
+    x = np.add([0.1, 0.4, 0.75], np.stack([0.0 * end, end], axis=1))
+    x = x + np.random.default_rng(3).normal(0.0, 2e-4, x.shape)
+    sb.Recording(x[:, :, ["xyz".index(axis) for axis in order]], t, name="take").save("take.csv")
+    refused = run("new", "take.csv", "-o", "take.toml", *options)
+    assert refused.exit_code == 2 and "sb.Recording.load('take.csv')" in refused.output
+    (script,) = re.findall(r"in Python: (.*)\.$", refused.output.strip())
+    exec(script, {"sb": sb})
+    again = run("new", "turned.csv", "-o", "take.toml")
+    assert again.exit_code == 0 and "looks like a pendulum" in again.output
 
 
 def test_a_pendulum_in_millimeters(tmp_path: Path) -> None:
@@ -400,3 +454,91 @@ def test_markers_with_the_name_of_a_body_are_not_on_the_rope(tmp_path: Path) -> 
     (rope,) = content["scene"].get("rope", content["scene"].get("rod"))
     assert "Hand" not in " ".join(rope["markers"])
     assert set(rope["grip"][0]["markers"]) == set(names[:4])
+    moved = Take(
+        seen(sb.Recording(np.add(x, [1.0, 0.0, 0.0]), np.arange(len(x)) / RATE, names, name="moved")), "moved.csv"
+    )
+    _, other = tomllib.loads(draft([take, moved], "take").text)["recording"]  # its grip has a place of its own
+    (grip,) = other["here"]["rope"]["grip"]
+    assert "markers" not in other["here"]["rope"]
+    assert np.subtract(grip["position"], rope["grip"][0]["position"]) == pytest.approx([1.0, 0.0, 0.0], abs=1e-5)
+
+
+def test_takes_of_one_rope_with_markers_of_their_own(tmp_path: Path) -> None:
+    """They were refused; and where markers that were put on anew kept their names, the longest distances of both takes
+    made one rope of 1.4 m."""
+    x = swinging(0.0)
+    share = {
+        "anew": np.array([0.0, 0.3, 1.1, 2.6, 3.2, 4.4, 5.3, 6.1, 7.7, 8.2, 9.6]),
+        "renamed": np.array([0.0, 1.5, 3.0, 4.5, 6.0, 7.5, 9.0]),
+    }
+    takes, t = [], np.arange(len(x)) / RATE
+    for name, at in {"first": np.arange(11.0), **share}.items():
+        k = np.minimum(at.astype(int), 9)
+        part = x[:, k] + (at - k)[:, None] * (x[:, k + 1] - x[:, k])
+        names = [f"m{j}" for j in range(len(at))]
+        if name == "renamed":  # from the free end on
+            names, part = [f"p{j}" for j in range(len(at))], part[:, ::-1]
+        part = part + np.random.default_rng(7).normal(0.0, NOISE, part.shape)
+        recording = sb.Recording(part, t, names, name=name)
+        recording.save(tmp_path / f"{name}.csv")
+        takes.append(Take(seen(recording), f"{name}.csv"))
+    found = draft(takes, "rope")
+    (tmp_path / "rope.toml").write_text(found.text)
+    content = tomllib.loads(found.text)
+    (rope,) = content["scene"].get("rope", content["scene"].get("rod"))
+    assert rope["length"] == pytest.approx(1.0, abs=0.01)
+    for part, (name, at) in zip(content["recording"][1:], share.items(), strict=True):
+        arcs = part["here"]["rope"]["markers"]
+        assert sorted(arcs.values()) == pytest.approx(0.1 * at, abs=3e-3)
+        assert sum(f"{name}.csv has markers of its own" in sentence for sentence in found.seen) == 1
+    assert content["recording"][2]["here"]["rope"]["grip"][0]["markers"] == ["p6"]
+    first, anew, renamed = build(parse(tmp_path / "rope.toml"), tmp_path).experiments
+    assert [len(e.places) for e in (first, anew, renamed)] == [11, 11, 7]
+    wrong = found.text.replace("[recording.here.rope.markers]", "[recording.here.robe.markers]", 1)
+    (tmp_path / "wrong.toml").write_text(wrong)
+    with pytest.raises(sb.ConfigError, match=r"recording\[1\]\.here: names no rope of the scene"):
+        build(parse(tmp_path / "wrong.toml"), tmp_path)
+
+
+def test_takes_of_a_cloth_with_other_markers_are_refused(tmp_path: Path) -> None:
+    x, takes = shaken(grid(5, 8, 0.15, 0.0714)), []
+    for letter in "mp":
+        recording = sb.Recording(x, np.arange(len(x)) / RATE, [f"{letter}{k}" for k in range(40)], name=letter)
+        takes.append(Take(seen(recording), f"{letter}.csv"))
+    with pytest.raises(sb.RecordingError, match=r"of p\.csv differ from the first file's"):
+        draft(takes, "cloth")
+
+
+def test_other_things_beside_a_rope(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two ropes were drafted as one of 2.9 m, and a rope as held at its free end by a body that is 0.8 m away."""
+    monkeypatch.chdir(tmp_path)
+    x, t = swinging(0.0), np.arange(301) / RATE
+    x = x + np.random.default_rng(7).normal(0.0, NOISE, x.shape)
+    box = np.add([0.8, 0.0, 0.5], [[0.0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]])
+    body = box + 0.1 * np.sin(3.0 * t)[:, None, None] * [1.0, 0.0, 0.0]
+    ropes, boxes = ([f"{kind}{k}" for k in range(count)] for kind, count in (("r", 11), ("box", 4)))
+    sb.Recording(np.concatenate([x, body], axis=1), t, [*ropes, *boxes], name="both").save("both.csv")
+    sb.Recording(x, t, ropes, name="both").save("alone.csv")
+    other = [f"s{k}" for k in range(11)]
+    sb.Recording(np.concatenate([x, x * [1, -1, 1] + [0.5, 0.3, 0]], axis=1), t, [*ropes, *other]).save("two.csv")
+    scenes = []
+    for name, options in {"both": (), "alone": (), "two": ("--markers", "r*")}.items():
+        done = run("new", f"{name}.csv", "-o", f"{name}.toml", *options)
+        assert done.exit_code == 0, done.output
+        assert ("a rigid body far from the rope" in done.output) == (name == "both")
+        scenes.append(tomllib.loads(Path(f"{name}.toml").read_text())["scene"])
+    assert scenes[0] == scenes[1] == scenes[2]
+    refused = run("new", "two.csv", "-o", "none.toml")
+    assert refused.exit_code == 2 and "--markers 'r0,r1,r2," in refused.output and "two ropes" in refused.output
+    wrong = run("new", "two.csv", "-o", "none.toml", "--markers", "r*, q*")
+    assert wrong.exit_code == 2 and "(got 'q*')" in wrong.output
+
+
+def test_a_rope_that_is_let_go(tmp_path: Path) -> None:
+    """Its fall was fitted and predicted too, as the motion of a hand that goes down with gravity."""
+    found, content = drafted(tmp_path, swinging(0.0, let_go=2.2))
+    (recording,) = content["recording"]
+    assert recording["held_out"][1] == pytest.approx(2.2, abs=0.04)
+    assert any("it falls freely from 2.1" in s or "it falls freely from 2.2" in s for s in found.seen)
+    whole, _ = drafted(tmp_path, swinging(0.0))
+    assert not any("falls freely" in s for s in whole.seen)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from enum import StrEnum
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -92,6 +93,13 @@ def new(
             show_default=False,
         ),
     ] = None,
+    markers: Annotated[
+        str | None,
+        typer.Option(
+            help='Look at these markers alone, such as "m0,m1,m2" or "rope_*", where a recording shows several things.',
+            show_default=False,
+        ),
+    ] = None,
     poses: Annotated[
         Path | None,
         typer.Option(
@@ -109,7 +117,7 @@ def new(
     Example: sheetbend new take.csv --density 0.05
     """
     measured = Measured(density, length)
-    run(lambda console: _new(console, files, output, measured, units, up, poses), json)
+    run(lambda console: _new(console, files, output, measured, units, up, markers, poses), json)
 
 
 def _new(
@@ -119,6 +127,7 @@ def _new(
     measured: Measured,
     units: str | None,
     up: Up | None,
+    markers: str | None,
     poses: Path | None,
 ) -> Outcome:
     for option, given, fix in (
@@ -128,11 +137,13 @@ def _new(
         if given is not None and not 0 < given < float("inf"):
             raise ConfigError(option, "must be positive", given, fix)
     if is_mesh := files[0].suffix.lower() in garment.FILES:
-        _check_mesh(files, measured, up, poses)
+        _check_mesh(files, measured, up, markers, poses)
         name = _name(files[0].stem)
     else:
         with options(units="--units"):
             recordings = [_read(file, units) for file in files]
+        if markers is not None:
+            recordings = [(_chosen(recording, markers), unit) for recording, unit in recordings]
         name = _name(recordings[0][0].name)
     target = output if output is not None else Path(f"{name}.toml")
     if target.suffix.lower() != ".toml":
@@ -180,7 +191,17 @@ def _written(console: Console, target: Path, name: str, found: Draft, source: st
     return Outcome({"name": name, "config": str(target)} | _said(found) | data)
 
 
-def _check_mesh(files: list[Path], measured: Measured, up: Up | None, poses: Path | None) -> None:
+def _chosen(recording: Recording, markers: str) -> Recording:
+    """The markers whose names match a list of names and patterns, in the recording's order."""
+    patterns = [pattern.strip() for pattern in markers.split(",")]
+    for pattern in patterns:
+        if not any(fnmatchcase(name, pattern) for name in recording.markers):
+            fix = f"name some of: {', '.join(recording.markers)}; * stands for any characters"
+            raise ConfigError("--markers", f"names no marker of {recording.name}", pattern, fix)
+    return recording.select([name for name in recording.markers if any(fnmatchcase(name, p) for p in patterns)])
+
+
+def _check_mesh(files: list[Path], measured: Measured, up: Up | None, markers: str | None, poses: Path | None) -> None:
     """A garment comes in one file, has no length, and nothing moves it."""
     if poses is not None:
         raise ConfigError("--poses", "go with a recording, and the first file is a mesh", str(poses), "leave them out")
@@ -188,6 +209,8 @@ def _check_mesh(files: list[Path], measured: Measured, up: Up | None, poses: Pat
         raise ConfigError("FILES", "are several, and the first is a mesh", [str(f) for f in files], "give one mesh")
     if measured.length is not None:
         raise ConfigError("--length", "is of a rope or a beam", measured.length, "leave it out")
+    if markers is not None:
+        raise ConfigError("--markers", "are of a recording", markers, "leave them out")
     if up is not None:
         raise ConfigError(
             "--up", "is of a recording", str(up), "leave it out, and change `gravity` in the configuration"

@@ -33,7 +33,7 @@ from .recordings import (
 )
 from .rest import check_rest
 from .scenes import build_scene
-from .shown import ropes_shown, with_grids, without
+from .shown import ropes_shown, with_grids, with_own_markers, without
 from .solver_schema import solver_for
 from .start_values import check_names, fields_of_parameter, set_start_values
 from .tools import tools_of
@@ -121,11 +121,11 @@ def build(config: schema.Config, folder: Path, finer: int = 1) -> Study:
     return study
 
 
-def scene_alone(config: schema.Config, folder: Path = Path()) -> tuple[Scene, Solver]:
-    """The scene of a configuration without recordings, and its solver; files of meshes are relative to `folder`."""
+def scene_alone(config: schema.Config, folder: Path = Path(), finer: int = 1) -> tuple[Scene, Solver]:
+    """The scene of a configuration without recordings, and its solver; `folder` and `finer` as in `build`."""
     check_solver(config.scene, config.solver)
     tools = tools_of(config.scene, {}, None, 0.0, folder, "")
-    scene, _ = build_scene(config.experiment.name, config.scene, None, {}, folder=folder, tools=tools)
+    scene, _ = build_scene(config.experiment.name, config.scene, None, {}, finer, folder=folder, tools=tools)
     set_start_values(scene, config, {}, "")
     solver = solver_for(config.solver, None)
     with located("scene"):
@@ -146,6 +146,7 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
     ropes = ropes_shown(config, section, path)
     listed = Listed.of(config, section, path, recording)
     described = with_grids(without(config.scene, section.leave_out, path), section.grids, path)
+    described = with_own_markers(described, section.here, path)
     tools = tools_of(described, section.tools, recording, t0, folder, path)
     seats = listed.seats(described, ropes)
     scene, particles = build_scene(recording.name, described, moment, seats, finer, ropes, folder, tools)

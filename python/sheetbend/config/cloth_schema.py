@@ -90,12 +90,17 @@ class VertexSet(Section):
     markers: list[str | int] | None = key(
         None, "the vertices nearest to these markers where they are at the scene's start", min_length=1
     )
+    radius: Finite | None = key(
+        None, "of the patch of fabric about each of the points or markers whose vertices belong to it too", "m", gt=0
+    )
 
     @model_validator(mode="after")
     def _one_way_to_choose(self) -> Self:
         box = self.lower is not None or self.upper is not None
         if box + (self.points is not None) + (self.markers is not None) != 1:
             raise ValueError("does not say which vertices|give one of: a box (lower, upper), points, markers")
+        if box and self.radius is not None:
+            raise ValueError("has a box and a radius|leave out one of them")
         return self
 
 
@@ -271,6 +276,10 @@ class Cloth(Section):
         "shape that a recording's scene starts from: as placed, or smoothly through the markers on it, as first "
         "measured (their mean when static)",
     )
+    velocity: Literal["recording"] | None = key(
+        None, 'initial velocity: "recording" takes that of the markers on it; at rest when left out'
+    )
+    smoothing: Finite = key(0.05, "over which markers are smoothed for `velocity`", "s", gt=0)
 
     @field_validator("markers")
     @classmethod

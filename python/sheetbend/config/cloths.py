@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .. import mesh as meshes
+from ..arrays.smoothing import state_at
 from ..errors import ConfigError
 from ..mesh import Places, TriangleMesh
 from ..mesh.places import nearest
@@ -26,10 +27,11 @@ from .tools import tool_named
 
 _ELSEWHERE = {
     *("name", "mesh", "law", "origin", "x_axis", "y_axis", "on_tool", "set", "pinned", "grip"),
-    *("bar", "markers", "grid", "nearest_at", "layout", "shape"),
+    *("bar", "markers", "grid", "nearest_at", "layout", "shape", "velocity", "smoothing"),
     *("air_normal", "air_tangential", "pressure", "volume"),
 }
 """Keys of a cloth that are not arguments of `add_cloth`, or not as they stand."""
+_AT_PIN = 1e-6  # of the cloth's size: a marker so near to a pinned vertex sits on it
 _SQUARE = 1e-6  # of the product of their lengths: how far two axes may be from perpendicular
 
 
@@ -58,6 +60,8 @@ def build_cloth(
     pinned = [_members(f"{path}.pinned", mesh, name) for name in section.pinned]
     gripped = [_members(f"{path}.grip[{i}].set", mesh, grip.set) for i, grip in enumerate(section.grip)]
     fields = section.model_dump(exclude=_ELSEWHERE, exclude_none=True)
+    if section.velocity is not None:
+        fields["velocity"] = _speeds(path, section, mesh, seated, moment, pinned)
     with located(path, section.name):
         held = np.unique(np.concatenate([np.zeros(0, dtype=int), *pinned, *gripped]))
         cloth = add_cloth(scene, mesh, section.name, law=_law(section.law), held=held, positions=shape, **fields)
@@ -102,24 +106,53 @@ def _recorded(
     path: str, section: schema.Cloth, mesh: TriangleMesh, seated: Mapping[str, Places], moment: Moment | None
 ) -> np.ndarray:
     """(vertices, 3) m, smoothly through the markers on a mesh at the start, and through bars that hold its sides."""
-    where = f"{path}.shape"
-    if moment is None:
-        raise ConfigError(where, "needs a recording", "recording", "add a [[recording]], or leave the key out")
-    if not seated:
-        fix = "give markers, or nearest_at"
-        raise ConfigError(where, "needs markers on the cloth", "none", fix)
-    number = {marker: k for k, marker in enumerate(moment.recording.markers)}
-    order = [number[marker] for marker in seated]
-    fields = [np.concatenate([getattr(p, f) for p in seated.values()]) for f in ("triangles", "vertices", "weights")]
-    places, shape = Places(*fields), moment.shape[order]
+    places, order, moment = _seats(f"{path}.shape", seated, moment)
+    shape = moment.shape[order]
     if np.array_equal(places.positions(mesh.vertices), mesh.vertices) and not np.isnan(shape).any():
         return shape  # a marker on every vertex
     at, to = [places.positions(mesh.vertices)], [shape]
     for i, bar in enumerate(section.bar):
         held = mesh.vertices[_members(f"{path}.bar[{i}].set", mesh, bar.set)]
         at, to = [*at, held], [*to, _on_bar(f"{path}.bar[{i}]", bar, held, moment)]
-    with located(where):
+    with located(f"{path}.shape"):
         return through(mesh.vertices, np.concatenate(at), np.concatenate(to))
+
+
+def _speeds(
+    path: str,
+    section: schema.Cloth,
+    mesh: TriangleMesh,
+    seated: Mapping[str, Places],
+    moment: Moment | None,
+    pinned: Sequence[np.ndarray],
+) -> np.ndarray:
+    """(vertices, 3) m/s, smoothly through the velocities of the markers at the start, and zero where it is pinned."""
+    places, order, moment = _seats(f"{path}.velocity", seated, moment)
+    if moment.static:
+        raise ConfigError(
+            f"{path}.velocity", "belongs to a motion, and the recording is static", section.velocity, "leave it out"
+        )
+    at = places.positions(mesh.vertices)
+    _, speeds = state_at(moment.whole.times, moment.whole.positions[:, order], moment.t0, section.smoothing)
+    still = np.unique(np.concatenate([np.zeros(0, dtype=int), *pinned]))
+    apart = np.linalg.norm(mesh.vertices[still][:, None] - at[None], axis=2).min(axis=1)
+    beside = mesh.vertices[still[apart > _AT_PIN * np.ptp(mesh.vertices, axis=0).max()]]
+    with located(f"{path}.velocity"):
+        found = through(mesh.vertices, np.concatenate([at, beside]), np.concatenate([speeds, np.zeros_like(beside)]))
+    found[still] = 0.0
+    return found
+
+
+def _seats(path: str, seated: Mapping[str, Places], moment: Moment | None) -> tuple[Places, list[int], Moment]:
+    """Places of the markers on a cloth, their numbers in the recording, and this."""
+    if moment is None:
+        raise ConfigError(path, "needs a recording", "recording", "add a [[recording]], or leave the key out")
+    if not seated:
+        fix = "give markers, or nearest_at"
+        raise ConfigError(path, "needs markers on the cloth", "none", fix)
+    number = {marker: k for k, marker in enumerate(moment.recording.markers)}
+    fields = [np.concatenate([getattr(p, f) for p in seated.values()]) for f in ("triangles", "vertices", "weights")]
+    return Places(*fields), [number[marker] for marker in seated], moment
 
 
 def _on_bar(path: str, bar: schema.Bar, placed: np.ndarray, moment: Moment) -> np.ndarray:
@@ -201,6 +234,9 @@ def _with_set(
     if len(np.unique(vertices)) < len(vertices):
         fix = "leave out all but one of them, or use a finer mesh"
         raise ConfigError(path, "has one vertex nearest to several", chosen.name, fix)
+    if chosen.radius is not None:
+        far = np.linalg.norm(mesh.vertices[:, None] - mesh.vertices[vertices], axis=2).min(axis=1)
+        vertices = np.flatnonzero(far <= chosen.radius * (1 + 1e-9))
     with located(path):
         return mesh.with_set(chosen.name, vertices)
 

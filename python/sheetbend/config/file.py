@@ -26,8 +26,8 @@ _PART = r"(?:[A-Za-z0-9_-]++|\"[^\"\n]*+\"|'[^'\n]*+')"
 _MANY_PARTS = re.compile(rf"(?<![A-Za-z0-9_-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{50}}")
 
 
-def load(path: str | Path) -> Study:
-    """Read, check and build a configuration.
+def load(path: str | Path, finer: int = 1) -> Study:
+    """Read, check and build a configuration; `finer` multiplies the segments of ropes and the cells of cloths.
 
     Raises:
         ConfigError: the file is missing, no TOML, larger than `LARGEST`, or a key is unknown, missing or wrong; more
@@ -35,7 +35,7 @@ def load(path: str | Path) -> Study:
     """
     path = Path(path)
     with reading(path, ConfigError):
-        return build(parse(path), path.parent)
+        return build(parse(path), path.parent, finer)
 
 
 def parse(path: str | Path) -> Config:

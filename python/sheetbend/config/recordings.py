@@ -19,7 +19,7 @@ from .schema import RecordingSection
 TAKEN = (
     {"file", "cloud", "mend", "name", "frames", "hidden", "fit", "held_out"}  # the recording
     | {"ropes", "leave_out", "tools", "values", "force", "max_gap", "driven_motion"}  # its scene
-    | {"marker", "grids", "offsets"}  # the places of its markers
+    | {"marker", "here", "grids", "offsets"}  # the places of its markers
 )
 """Keys of [[recording]] that the configuration itself turns into something. Every other goes under its own name to the
 reader or to `Experiment`, so that none is forgotten."""

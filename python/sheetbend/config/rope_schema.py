@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import model_validator
+from pydantic import AfterValidator, model_validator
 
 from .section import MOST_LINKS, Finite, Name, Section, Vector, key
 
@@ -70,6 +70,27 @@ class RopeGrip(Section):
         return self
 
 
+def _one_at_each_end(grips: list[RopeGrip]) -> list[RopeGrip]:
+    for at in ("start", "end"):
+        count = sum(grip.at == at for grip in grips)
+        if count > 1:
+            raise ValueError(f"has {count} grips at its {at}|give one, with all of its markers")
+    return grips
+
+
+RopeGrips = Annotated[list[RopeGrip], AfterValidator(_one_at_each_end)]
+
+
+class RopeHere(Section):
+    """[recording.here.NAME]: the markers on a rope or rod and what moves its ends in this recording, instead of its
+    own: for takes of one rope whose markers were put on anew, or have other names."""
+
+    markers: dict[str, Finite] | None = key(
+        None, "markers on it and their arc lengths from the start; its own when left out", "m", min_length=1
+    )
+    grip: RopeGrips | None = key(None, "what holds its ends and moves them; its own grips when left out")
+
+
 class Strand(Section):
     """What ropes and rods share."""
 
@@ -108,7 +129,7 @@ class Strand(Section):
     )
     clamp_end: Vector | None = key(None, "direction of travel at the end, held by a clamp there")
     pinned: list[int] = key([], "nodes that are held where they start; -1 is the last")
-    grip: list[RopeGrip] = key([], "what holds its ends and moves them")
+    grip: RopeGrips = key([], "what holds its ends and moves them")
     tilts: bool = key(False, "adds <name>_start_tilt_1, ... (rad): it leaves its grips askew by these angles")
     shifts: bool = key(
         False, "adds <name>_start_shift_1, ... (m): it leaves its grips so far beside and before their places"
@@ -117,10 +138,7 @@ class Strand(Section):
     @model_validator(mode="after")
     def _held_once(self) -> Self:
         for at, clamp in (("start", self.clamp_start), ("end", self.clamp_end)):
-            grips = [grip for grip in self.grip if grip.at == at]
-            if len(grips) > 1:
-                raise ValueError(f"has {len(grips)} grips at its {at}|give one, with all of its markers")
-            if grips and clamp is not None:
+            if clamp is not None and self.grip_at(at) is not None:
                 fix = "leave out one of them; `direction` of a grip with one marker keeps a direction"
                 raise ValueError(f"has a grip and clamp_{at} at its {at}|{fix}")
         if self.velocity is not None and self.points != "recording":

@@ -7,6 +7,7 @@ from typing import Any, Literal, Self
 from pydantic import model_validator
 
 from .cloth_schema import MarkerGrid
+from .rope_schema import RopeHere
 from .scene_schema import SceneSection
 from .section import AXES, Finite, Name, Pair, Quaternion, Reference, Section, Vector, Window, key
 from .solver_schema import SolverSection
@@ -174,6 +175,7 @@ class RecordingSection(Section):
         "s",
     )
     marker: list[Marker] = key([], "places of this recording's markers; those of [[marker]] when left out")
+    here: dict[Name, RopeHere] = key({}, "by rope or rod, its markers and grips in this recording, instead of its own")
     grids: dict[Name, MarkerGrid] = key({}, "by cloth, markers on a grid in this recording, instead of the cloth's own")
     offsets: dict[str, list[str]] = key(
         {},

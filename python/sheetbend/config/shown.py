@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from ..errors import ConfigError
 from . import schema
 from .cloth_schema import MarkerGrid
+from .rope_schema import RopeHere
 from .scene_schema import SceneSection
 
 OPTIONAL = ("cloth", "particles", "constraints", "point_mass", "force", "contact")
@@ -56,3 +58,27 @@ def with_grids(scene: SceneSection, grids: Mapping[str, MarkerGrid], path: str) 
         raise ConfigError(f"{path}.grids", "name no cloth of the scene", sorted(unknown), fix)
     cloths = [c.model_copy(update={"grid": grids[c.name]}) if c.name in grids else c for c in scene.cloth]
     return scene.model_copy(update={"cloth": cloths})
+
+
+def with_own_markers(scene: SceneSection, here: Mapping[str, RopeHere], path: str) -> SceneSection:
+    """The scene's description with a recording's own markers and grips of ropes and rods.
+
+    Raises:
+        ConfigError: one is no rope or rod of the scene.
+    """
+    strands = [strand.name for _, strand in scene.strands]
+    unknown = set(here) - set(strands)
+    if unknown:
+        fix = f"name some of: {', '.join(strands) or 'none'}"
+        raise ConfigError(f"{path}.here", "names no rope of the scene", sorted(unknown), fix)
+    return scene.model_copy(
+        update={
+            "rope": [rope.model_copy(update=_own(here.get(rope.name))) for rope in scene.rope],
+            "rod": [rod.model_copy(update=_own(here.get(rod.name))) for rod in scene.rod],
+        }
+    )
+
+
+def _own(here: RopeHere | None) -> dict[str, Any]:
+    given = {} if here is None else {"markers": here.markers, "grip": here.grip}
+    return {key: part for key, part in given.items() if part is not None}

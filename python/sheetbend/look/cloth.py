@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import RecordingError
 from . import robot
+from .beginning import lets_go
 from .cloth_held import SAGS, SIDES, Hold, holds, row_of, share, slung
 from .cloth_parts import cloth_parts
 from .cloth_sheet import Sheet
@@ -84,6 +85,8 @@ def _described(takes: Sequence[Take], measured: Measured, stands: bool) -> Descr
     sheets = [sheet for k, sheet in enumerate(sheets) if k not in sides]
     for sheet in sheets:
         notes += seen_of(s, sheet, len(cloths) > 1)
+        if _moves(s, sheet):
+            notes.append("it moves at the first frame: speeds at the start are those of the markers")
     if not sheets:
         fix = "measure the fabric between the markers and write the configuration by hand, see docs/configuration.md"
         raise RecordingError("markers", "lie on a cloth that something holds up from below", joined(names), fix)
@@ -259,6 +262,7 @@ def _cloth(s: Seen, sheet: Sheet, density: float) -> list[str]:
     cloth |= {"origin": origin.tolist(), "x_axis": axes[0].tolist(), "y_axis": axes[1].tolist()}
     through = sheet.ride is None and not sheet.starts_flat and (s.recording.mask[0, sheet.own].all() or s.static)
     cloth["shape"] = "recording" if through else None
+    cloth["velocity"] = "recording" if _moves(s, sheet) else None
     pinned, sets, grips = (
         sum(found, list[Any]()) for found in zip(*(h.tables(names, s) for h in sheet.held), strict=True)
     )
@@ -279,6 +283,11 @@ def _cloth(s: Seen, sheet: Sheet, density: float) -> list[str]:
     if sheet.slung:  # else the shape at the start would end in the air beyond the outer markers
         places |= {names[k]: at for hold in sheet.held for k, at in _at_edge(sheet, hold)}
     return lines + table("[scene.cloth.markers]", places)
+
+
+def _moves(s: Seen, sheet: Sheet) -> bool:
+    """Whether a cloth moves at the first frame."""
+    return not s.static and not s.rest and sheet.ride is None and not lets_go(s, sheet.own)
 
 
 def _at_edge(sheet: Sheet, hold: Hold) -> list[tuple[int, list[float]]]:

@@ -17,6 +17,7 @@ Array = np.ndarray
 QUIET = 0.1  # of the motion of all: how little a row moves where the edge beyond it is held
 STAYS = 0.3  # of the motion of all, and of any other side: how little the row moves that is next to a held edge
 SAGS = 0.03  # of its length: by so much a row of markers hangs below its ends where only these are held
+LEVEL = 0.05  # of the motion of all: by so much the row of markers below a rail moves up and down
 HANGS = 0.4  # of its length: a cloth of which one end is so much higher than the other is not level
 AROUND = 6  # markers next to a holder show how the cloth lies there
 REACHES = 2.5  # spacings from the nearest marker on the cloth: how near a holder's marker is
@@ -151,17 +152,25 @@ def holds(
         sags = _sags(x, row)
         bar = None if sags or len(near) > 1 else bars.get(markers[0], tuple(_direction(x, row).tolist()))
         found.append(Hold(side, markers, sags, moves, beyond, False, along, bar))
-    if not found and len(sides) == 1:
+    on_rail = len(sides) == 1 and _on_rail(s, [numbers[k] for k in row_of(flat, sides[0], apart)], moved)
+    if not found and len(sides) == 1 and not on_rail:
         sides = _at_rest(s, numbers, flat, apart) or sides
     for side in () if found else sides:
         row = [numbers[k] for k in row_of(flat, side, apart)]
         moves = not s.static and motion(x[:, row]) >= QUIET * moved
-        corners = _sags(x, row)
+        corners = not on_rail and _sags(x, row)
         told = None if moves or corners else margin(x[:, numbers], flat, *SIDES[side])
         markers = _corners(s, row) if corners else tuple(row)
         beyond = 0.0 if told is None else told.length
         found.append(Hold(side, markers, corners, moves, beyond, True, margin=told))
     return found
+
+
+def _on_rail(s: Seen, row: list[int], moved: float) -> bool:
+    """Whether a row of markers moves and stays at one height, as that of a curtain below its rail."""
+    height = s.recording.positions[:, row] @ (s.gravity / np.linalg.norm(s.gravity))
+    level = float(np.nanstd(height)) < max(LEVEL * moved, 2.0 * s.noise)
+    return level and motion(s.recording.positions[:, row]) >= QUIET * moved
 
 
 def _at_rest(s: Seen, own: list[int], flat: Array, apart: float) -> tuple[str, ...]:

@@ -91,7 +91,8 @@ def unknown_of(s: Seen, sheets: Sequence[Sheet], measured: Measured) -> list[str
     if any(hold.corners for hold in held):
         said.append(
             "how large a patch is held at each corner: one vertex of the mesh is taken, and a cloth that is held at "
-            "single vertices comes out too soft. Measure the patches, and give each set a box (`lower`, `upper`)"
+            "single vertices comes out too soft. Measure the patches, give each set their `radius`, and take smaller "
+            "cells. One marker also does not show how a hand turns its patch: name two of each hand in its grip"
         )
     said.append(
         "the size of the flat fabric: distances are taken as it hangs, stretched by its weight and the air. If that is "

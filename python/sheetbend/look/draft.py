@@ -9,8 +9,11 @@ import numpy as np
 
 from ..errors import RecordingError
 from . import cantilever, cloth, flight, gripped, pendulum, rope
+from .seen import Seen
 from .take import Measured, Take
 from .text import comment, joined, table
+
+FEWEST = 3  # markers of anything but a pendulum
 
 
 @dataclass(frozen=True)
@@ -37,12 +40,9 @@ def draft(takes: Sequence[Take], name: str, measured: Measured | None = None) ->
         RecordingError: recordings of different markers, or one that shows nothing that a model is for.
     """
     first = takes[0].seen
-    for take in takes[1:]:
-        if take.seen.recording.markers != first.recording.markers:
-            fix = "give recordings of the same markers, or make one configuration for each"
-            raise RecordingError("markers", f"of {take.file} differ from the first file's", take.file, fix)
+    own = [take.file for take in takes if take.seen.recording.markers != first.recording.markers]
     for model in (pendulum, flight, cantilever, cloth, gripped, rope):
-        found = model.describe(takes, measured or Measured())
+        found = model.describe(takes if not own or model is rope else takes[:1], measured or Measured())
         if found is not None:
             break
     else:
@@ -51,10 +51,16 @@ def draft(takes: Sequence[Take], name: str, measured: Measured | None = None) ->
             fix = "record the motion for longer or at a higher rate, or write a configuration by hand"
             raise RecordingError(first.recording.name, "holds too few frames to tell what moves", frames, fix)
         got = joined(first.recording.markers)
+        if len(first.recording.markers) < FEWEST:
+            fix = "record three or more on a rope, and more on a cloth"
+            raise RecordingError("markers", "are too few to tell what moves, unless it is a pendulum", got, fix)
         fix = "write a configuration by hand, see docs/configuration.md"
         raise RecordingError(
             "markers", "do not move like a rope, beam, cloth, pendulum or a body in free flight", got, fix
         )
+    if own and model is not rope:
+        fix = "give recordings of the same markers, or make one configuration for each"
+        raise RecordingError("markers", f"of {joined(own)} differ from the first file's", found.kind, fix)
     if measured is not None and measured.poses is not None and model is not cloth:
         fix = "leave them out: a rope takes markers on what holds it"
         raise RecordingError("poses", "are for a cloth that a robot holds, and this is", found.kind, fix)
@@ -112,6 +118,12 @@ def _told(takes: Sequence[Take], up: int | None) -> list[str]:
     said.append(f"the markers fill a box of {' x '.join(f'{v:.3g}' for v in box)} m")
     if first.speed > 0:
         said.append(f"the fastest marker moves at {first.speed:.2g} m/s")
+        far, near = first.speed * _step(first.recording.times), _neighbors(first)
+        if far > near:
+            said.append(
+                f"between two frames it moves up to {far:.2g} m, farther than from one marker to the next: the motion "
+                "between frames is not known. Record at a higher rate"
+            )
     if takes[0].units is not None:
         said.append(f"lengths are taken as {takes[0].units}")
     if first.up_by == "guess" and up is not None:
@@ -127,6 +139,13 @@ def _told(takes: Sequence[Take], up: int | None) -> list[str]:
         axis = ("-" if first.gravity[down] > 0 else "") + "xyz"[down]
         said.append(f"{axis} points up, as {'the file says' if first.up_by == 'file' else 'given'}")
     return said
+
+
+def _neighbors(s: Seen) -> float:
+    """m, from a marker to the nearest other one: the median."""
+    if len(s.apart) < 2:
+        return float("inf")
+    return float(np.median(np.sort(s.apart, axis=1)[:, 1]))
 
 
 def _step(times: np.ndarray) -> float:

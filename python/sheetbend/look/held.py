@@ -19,6 +19,7 @@ NAMES = ("hand", "grip", "wrist", "clamp", "robot", "holder", "finger")
 SMOOTHING, ALONE = 0.06, 0.12  # s, of recorded grips; of one that has one marker
 STIFF = 0.75  # of the next chord's: how much the direction at an end varies at most in a clamp; a pin has 1 or more
 NEAR = 1.5  # times the distance of neighbors on the rope: how near its first marker is to the second
+AWAY = 4.0  # times the distance of neighbors on the rope: a rigid body so far from all of them is not on it
 TURNS = 2.0  # times what it does move: how far a marker in a clamp would move if the rope turned there
 UNSURE = 0.6  # times the noise: so much motion cannot be told from it
 LEAST = 1e-4  # m, taken as the noise where there is less
@@ -56,9 +57,11 @@ def parts(s: Seen) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Markers of the hand's rigid body, and those of the rope in order."""
     count = len(s.recording.markers)
     known = named(s)
-    hands = [b for b in s.bodies if known & set(b)] or [b for b in s.bodies if count - len(b) >= 3]
+    away = {k for b in s.bodies if not known & set(b) and _away(s, b) for k in b}
+    near_rope = [b for b in s.bodies if not away & set(b)]
+    hands = [b for b in near_rope if known & set(b)] or [b for b in near_rope if count - len(away) - len(b) >= 3]
     hand = hands[0] if hands else ()
-    order = chain(s.apart, tuple(k for k in range(count) if k not in hand))
+    order = chain(s.apart, tuple(k for k in range(count) if k not in hand and k not in away))
     if len(hand) <= 3 or len(order) < 3:
         return hand, order
     # the rope's own first marker keeps its place in the hand too
@@ -73,6 +76,15 @@ def parts(s: Seen) -> tuple[tuple[int, ...], tuple[int, ...]]:
         hand = tuple(k for k in hand if k != own)
         order = (own, *order) if at == 0 else (*order, own)
     return hand, order
+
+
+def _away(s: Seen, body: tuple[int, ...]) -> bool:
+    """Whether a rigid body is far from every other marker, as one that no rope is fixed to."""
+    others = [k for k in range(len(s.recording.markers)) if k not in body]
+    if len(others) < 3:
+        return False
+    spacing = float(np.median(np.sort(s.apart[np.ix_(others, others)], axis=1)[:, 1]))
+    return float(s.apart[np.ix_(body, others)].min()) > AWAY * spacing
 
 
 def _slack(s: Seen, a: int, b: int) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..arrays.smoothing import smoothed
 from ..arrays.timeseries import default_max_gap, interpolate
+from ..errors import RecordingError
 from .seen import RIGID, Seen
 from .swing import Moments, Swing, moments
 from .take import Description, Measured, Take
@@ -17,6 +18,7 @@ from .text import table
 
 Array = np.ndarray
 FLAT, STRAIGHT = 0.02, 0.01  # of an arm: how far it may leave its plane, and how much its length may change
+HANGS = 0.5  # of an arm: how far its end is below the pivot on average, at least, where that tells what is up
 PIECES = {1: (3.0, 5.0), 2: (2.0, 2.0), 3: (1.0, 1.0)}  # s that are fitted and predicted at most, by arms: two diverge
 ARMS = {1: ["arm"], 2: ["upper", "lower"], 3: ["upper", "middle", "lower"]}
 KINDS = {1: "a pendulum", 2: "a double pendulum", 3: "a triple pendulum"}
@@ -33,7 +35,7 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     """One to three arms; None where the markers are not those of a pendulum."""
     s = takes[0].seen
     joints = _joints(s)
-    if joints is None or len(takes) > 1:
+    if joints is None or len(takes) > 1 or not _upright(takes[0], joints):
         return None
     r = s.recording
     x = r.positions
@@ -104,8 +106,6 @@ def _joints(s: Seen) -> list[int] | None:
     x, count = s.recording.positions, len(s.recording.markers)
     if not 2 <= count <= 4 or len(s.still) != 1 or len(s.recording.times) < LEAST_FRAMES:
         return None
-    if int(np.argmax(np.abs(s.gravity))) != 2:
-        return None
     order, left = [s.still[0]], set(range(count)) - set(s.still)
     while left:
         steady = [k for k in left if np.nanstd(_distance(x, order[-1], k)) < STRAIGHT * s.apart[order[-1], k]]
@@ -117,8 +117,31 @@ def _joints(s: Seen) -> list[int] | None:
         left.remove(steady[0])
     if count == 4 and not all(_rigid(s, a, b) for a, b in pairwise(order)):  # a rope almost keeps these distances
         return None
-    off = np.nanmax(np.abs(x[:, order, 1] - np.nanmean(x[:, order[0], 1])))
-    return order if off < FLAT * s.apart[order[0], order[1]] else None
+    return order
+
+
+def _upright(take: Take, joints: list[int]) -> bool:
+    """Whether the arms swing in a plane of two axes.
+
+    Raises:
+        RecordingError: it is not that of x and z with z up, in which arms are described.
+    """
+    s, r = take.seen, take.seen.recording
+    off = r.positions[:, joints] - np.nanmean(r.positions[:, joints[0]], axis=0)
+    wide = np.nanmax(np.abs(off), axis=(0, 1))
+    normal, down = int(np.argmin(wide)), np.nanmean(off[:, 1], axis=0)
+    if wide[normal] >= FLAT * s.apart[joints[0], joints[1]]:
+        return False
+    up = int(np.argmax(np.abs(down))) if s.up_by == "guess" else int(np.argmax(np.abs(s.gravity)))
+    if (normal, up) == (1, 2) or abs(down[up]) < HANGS * s.apart[joints[0], joints[1]]:
+        return normal == 1
+    axes = [3 - normal - up, normal, up]
+    fix = (
+        f"turn its axes, in Python: r = sb.Recording.load('{take.file}'); "
+        f"sb.Recording(r.positions[:, :, {axes}], r.times, r.markers).save('turned.csv')"
+    )
+    problem = "swing in another plane than that of x and z with z up, in which arms are described"
+    raise RecordingError("markers", problem, f"{'xyz'[axes[0]]} and {'xyz'[up]}, {'xyz'[up]} up", fix)
 
 
 def _rigid(s: Seen, a: int, b: int) -> bool:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from ..arrays.timeseries import mean_position
 from ..errors import RecordingError
+from .beginning import lets_go
 from .end_load import loaded_end
 from .held import Held, gripping, held, parts
-from .line import forks, plane, snapped, tangent
-from .lying import lies
+from .line import plane, snapped, tangent
+from .marked import Marked, marked_by, said_of
+from .one_rope import check_one_rope
+from .released import released
 from .seen import Seen
 from .take import Description, Measured, Take, max_gap
 from .text import joined, table
@@ -23,9 +25,7 @@ from .unseen import free_from
 Array = np.ndarray
 SUBSTEP = 1 / 500  # s, at most
 BENDING = 0.15  # of the length: bending length (EI/(density g))^(1/3) at the start
-EARLY = 0.05  # s, in which the speed at the first frame is looked for
 SEGMENTS = 40  # of a rope, at least
-BRANCHED = 1.1  # times the shortest tree: how much longer the line through all markers of a branched cable is
 FITTED, LONGEST = 2 / 3, 3.0  # share of the time that is fitted, and s at most; the next third is predicted
 CLAMP_SD = 0.2  # rad, of the direction of a clamp, read off the first markers
 LENGTH_SD = 0.01  # relative, of a length that is a sum of distances between markers
@@ -33,6 +33,7 @@ SET_MODES, SET_SD = (1, 2, 3, 4), 10.0  # of the rest curvature of shapes at res
 ROUND = 0.75  # GJ/EI of a round solid section with a Poisson ratio of 1/3
 LEAST_SIGMA = 1e-4  # m, of the markers of a motion: a model misses by as much
 NUMBERS = 1500  # of a hand's motion, three for every fitted frame: so many are estimated in minutes
+LEAST_HELD = 30  # frames before a rope is let go
 LEAST_FREE = 0.2  # of a recording: how much is left at least where its beginning is cut off
 HOLDER_SD = 0.5  # rad, of a clamp of a shape at rest, read off the markers of the same shape
 
@@ -64,32 +65,29 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     hand, order = parts(s)
     if len(order) < 3:
         return None
-    _unbranched(s, order)
-    if lies(s, order):
-        fix = (
-            "take the configuration in docs/tutorials/dragged_rope.md, with a table and its friction, for your markers"
-        )
-        got = joined(s.recording.markers[k] for k in order)
-        raise RecordingError("markers", "slide along at one height, as a rope on a floor or a table does", got, fix)
-    found = _at_rest(s, order) if s.static else held(s, hand, order)
+    if len(hand) + len(order) < len(r.markers):
+        return _without_others(takes, measured, [r.markers[k] for k in sorted((*hand, *order))])
+    if not s.static and len(takes) == 1 and (let_go := released(s, order)) is not None:
+        return _while_held(takes[0], measured, let_go)
+    check_one_rope(s, order)
+    found = _holding(s, hand, order)
     if len(found.order) < 3:
         return None
     pushed = None
     if s.rest and not s.static and not found.grips and len(takes) == 1:
         takes, pushed = _free(takes[0], found)
         s, r = takes[0].seen, takes[0].seen.recording
-    arc = _arcs(takes, found.order)
-    if found.grips and found.grips[0]["at"] == "start":
-        arc = arc + found.lead
-    length, measured_length, said_length = _length(s, found, float(arc[-1]), measured)
+    marked = marked_by(takes, found, _holding)
+    longest = max(marked, key=lambda own: own.arcs[-1])
+    length, measured_length, said_length = _length(s, longest, measured)
     if not measured_length and found.grips and found.grips[0]["at"] == "end":
         length += found.lead
-    arc = np.minimum(arc, length)
     density, said_density = _density(s, measured)
     names = r.markers
-    notes = [f"a rope through {joined(names[k] for k in order)}; {arc[-1]:.4g} m of it are free"]
+    far = f"{min(marked[0].arcs[-1], length):.4g} m"
+    notes = [f"a rope through {joined(names[k] for k in order)}; {far} of it are free"]
     if s.static:
-        notes = [f"a rope through {joined(names[k] for k in order)}, {arc[-1]:.4g} m from the first to the last"]
+        notes = [f"a rope through {joined(names[k] for k in order)}, {far} from the first to the last"]
     flat = plane(r.positions[:, list(order)], length) if s.static else None
     in_space = not s.static and plane(r.positions[:, list(order)], length) is None
     kind = "rod" if in_space and _can_be_rod(s, found) else "rope"
@@ -123,9 +121,7 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         step = float(np.median(np.diff(r.times)))
         lines += table("[solver]", {"substeps": max(1, int(np.ceil(step / SUBSTEP - 1e-9)))}, {"substeps": "per frame"})
     lines += table(f"[[scene.{kind}]]", rope | found.rope, why)
-    lines += table(
-        f"[scene.{kind}.markers]  # arc lengths in m", dict(zip((names[k] for k in found.order), arc, strict=True))
-    )
+    lines += table(f"[scene.{kind}.markers]  # arc lengths in m", marked[0].placed(length))
     load = None if s.static else loaded_end(s, found)
     if load is not None:
         at, mass = load[0], load[1] * density
@@ -137,17 +133,17 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         lines += table("[[scene.point_mass]]", {"name": "end", "particle": f"rope:{at}", "mass": mass}, {"mass": "kg"})
     for grip in found.grips:
         lines += table(f"[[scene.{kind}.grip]]", grip | ({"smoothing": 0.0} if estimated else {}))
-    for take in takes:
+    for here in marked:
+        take, r = here.take, here.take.seen.recording
         own = _recording(take, flat, "points" in rope) | {"driven_sigma": "estimate" if estimated else None}
-        r = take.seen.recording
-        driving = [r.markers.index(name) for grip in found.grips for name in grip["markers"]]
+        driving = [r.markers.index(name) for grip in here.held.grips for name in grip["markers"]]
         own["max_gap"] = max_gap(r.times, r.mask[:, driving])
         why = {
             "driven_sigma": "the fit estimates the hand's true motion",
             "held_out": "predicted, not fitted",
             "max_gap": "s, for which a marker of a grip is lost: closed by a cubic",
         }
-        lines += table("[[recording]]", own, why)
+        lines += table("[[recording]]", own, why) + (here.lines(length, estimated) if here is not marked[0] else [])
     for name, limits in _parameters(s.static, density, length, flat is not None, kind == "rod").items():
         lines += table(f"[parameters.{name}]", limits)
     if load is not None:
@@ -162,21 +158,34 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         lines += (
             table("[given.rope_length]", {"sd": LENGTH_SD}) if s.static else table("[parameters.rope_length]", prior)
         )
+    own_markers, held_there = said_of(marked)
+    notes, unknown = notes + own_markers, unknown + held_there
     if s.static and len(takes) > 1:
         lines += table("[fit]", {"leave_one_out": True}, {"leave_one_out": "predicts each shape from the others"})
     return Description("a rope" + (" at rest" if s.static else ""), [*notes, *found.notes], unknown, lines)
 
 
-def _unbranched(s: Seen, order: tuple[int, ...]) -> None:
-    """Refuse markers of a branched cable: their shortest tree forks, and is much shorter than any line through them."""
-    at, longer = forks(s.apart, order)
-    if at and longer > BRANCHED:
-        raise RecordingError(
-            "markers",
-            "lie along a cable that branches, so one rope cannot go through all of them",
-            f"branches near {joined(s.recording.markers[k] for k in at)}",
-            "give a recording of one branch, or write one [[scene.rod]] for each, see docs/configuration.md",
+def _without_others(takes: Sequence[Take], measured: Measured, kept: list[str]) -> Description | None:
+    """The rope alone, where a rigid body far from it is in the same recording."""
+    alone = [replace(take, seen=take.seen.of(take.seen.recording.select(kept))) for take in takes]
+    found = describe(alone, measured)
+    if found is not None:
+        others = [name for name in takes[0].seen.recording.markers if name not in kept]
+        found.notes.append(f"{joined(others)} move as a rigid body far from the rope: they are left out")
+    return found
+
+
+def _while_held(take: Take, measured: Measured, let_go: float) -> Description | None:
+    """The rope up to the time, s, at which it is let go, where that is long enough to tell something."""
+    r = take.seen.recording
+    if (r.times < let_go).sum() < LEAST_HELD:
+        return None
+    found = describe([replace(take, seen=take.seen.of(r.piece(float(r.times[0]), let_go)))], measured)
+    if found is not None:
+        found.notes.append(
+            f"it falls freely from {let_go:.3g} s on: what holds it lets go, and only the time before is used"
         )
+    return found
 
 
 def _free(take: Take, found: Held) -> tuple[list[Take], str | None]:
@@ -197,6 +206,10 @@ def _free(take: Take, found: Held) -> tuple[list[Take], str | None]:
     return [replace(take, seen=replace(s, recording=r.piece(start), rest=0.0))], said
 
 
+def _holding(s: Seen, hand: tuple[int, ...], order: tuple[int, ...]) -> Held:
+    return _at_rest(s, order) if s.static else held(s, hand, order)
+
+
 def _at_rest(s: Seen, order: tuple[int, ...]) -> Held:
     """Both ends of a shape at rest in clamps."""
     mean = mean_position(s.recording.positions)
@@ -205,20 +218,9 @@ def _at_rest(s: Seen, order: tuple[int, ...]) -> Held:
     return Held(order, clamps, notes=["nothing moves: a shape at rest"], unknown=unknown)
 
 
-def _arcs(takes: Sequence[Take], order: tuple[int, ...]) -> Array:
-    """(markers,) m along the rope. No chord is longer than its arc, so the longest ones count."""
-    pairs = list(pairwise(order))
-    chords = np.max([[take.seen.apart[a, b] for a, b in pairs] for take in takes], axis=0)
-    noise = max(take.seen.noise for take in takes)
-    if not takes[0].seen.static:
-        even = float(np.median(chords))
-        if len(chords) >= 4 and np.all(np.abs(chords - even) < 2.0 * noise):
-            chords = np.full(len(chords), even)  # all alike within their noise: the median is closer
-    return np.concatenate([[0.0], np.cumsum(chords)])
-
-
-def _length(s: Seen, found: Held, last: float, measured: Measured) -> tuple[float, bool, str]:
+def _length(s: Seen, longest: Marked, measured: Measured) -> tuple[float, bool, str]:
     """m, whether it was measured, and what is said of it."""
+    last = float(longest.arcs[-1])
     if measured.length is not None:
         if measured.length < 0.8 * last:
             problem = f"is shorter than the {last:.4g} m from the first to the last marker"
@@ -227,7 +229,8 @@ def _length(s: Seen, found: Held, last: float, measured: Measured) -> tuple[floa
     told = s.recording.metadata.get("length_m")
     if isinstance(told, int | float) and told >= 0.8 * last:
         return float(told), True, "whether the length that the file tells runs from the first to the last marker"
-    a, b = (s.recording.markers[k] for k in (found.order[0], found.order[-1]))
+    markers, order = longest.take.seen.recording.markers, longest.held.order
+    a, b = markers[order[0]], markers[order[-1]]
     return (
         last,
         False,
@@ -308,7 +311,7 @@ def _beginning(s: Seen, found: Held, rope: dict[str, Any], rod: bool) -> list[st
         del rope["points"]
         rope["direction"] = _straight(s, found.order)
         return [f"it hangs straight and rests for the first {s.rest:.2g} s"]
-    if not _lets_go(s, found.order):
+    if not lets_go(s, found.order):
         rope["velocity"] = "recording"
         return ["it moves at the first frame: place and speed at the start are those of the markers"]
     notes = ["at the first frame it moves no faster than its noise: it starts from rest"]
@@ -320,20 +323,6 @@ def _beginning(s: Seen, found: Held, rope: dict[str, Any], rod: bool) -> list[st
             found.rope["clamp_start"] = way
         notes.append("at the first frame it is straight within its noise")
     return notes
-
-
-def _lets_go(s: Seen, order: tuple[int, ...]) -> bool:
-    """Whether the speeds at the first frame are within what noise makes of none: the rope is let go there. The slope
-    of a parabola through N frames in the time T has the standard deviation sigma sqrt(192 / N) / T at its end."""
-    r = s.recording
-    t = r.times - r.times[0]
-    early = np.flatnonzero(t <= EARLY)
-    x = r.positions[early][:, list(order)]
-    x = x[:, np.isfinite(x).all(axis=(0, 2))]
-    if len(early) < 6 or not x.shape[1] or not s.noise:
-        return False
-    slope = np.linalg.lstsq(np.vander(t[early], 3, increasing=True), x.reshape(len(early), -1), rcond=None)[0][1]
-    return bool(np.abs(slope).max() < 4.0 * s.noise * np.sqrt(192 / len(early)) / t[early[-1]])
 
 
 def _straight(s: Seen, order: tuple[int, ...]) -> list[float] | None:

@@ -74,6 +74,10 @@ class Seen:
             return np.asarray(self.recording.gravity)
         return np.where(np.arange(3) == self.up, -EARTH, 0.0)
 
+    def of(self, part: Recording) -> Seen:
+        """What a part of the recording shows alone: some of its markers, or of its time."""
+        return replace(seen(part), up=self.up, up_by=self.up_by)
+
 
 def seen(recording: Recording, up: str | None = None) -> Seen:
     """Look at a recording.

@@ -79,7 +79,8 @@ def cloth(
     still = indices("cloth.pinned", pinned, len(mesh.vertices)) if np.size(pinned) else []
     given = {"held": still, **options}
     built = add_cloth(scene, mesh, name, density=density, warp=warp, shear=shear, **given)  # type: ignore[arg-type]
-    scene.pin(built.particles[still])
+    if len(still):
+        scene.pin(built.particles[still])
     return scene
 
 
@@ -102,6 +103,7 @@ def add_cloth(
     curved: bool = False,
     held: ArrayLike = (),
     positions: ArrayLike | None = None,
+    velocity: ArrayLike | None = None,
     membrane_damping: float | None = None,
     bend_damping: float | None = None,
     yield_curvature: float | None = None,
@@ -142,6 +144,7 @@ def add_cloth(
             sheet with the curvature model hold two rows or more: the clamp then acts in the middle between the last row
             and the one before it. A single row is a hinge line.
         positions: (vertices, 3) m, the initial shape; the mesh's vertices by default.
+        velocity: (vertices, 3) m/s; at rest by default.
         membrane_damping, bend_damping: Kelvin-Voigt time constants, s.
         yield_curvature: 1/m, the elastic curvature beyond which friction between fibers slides, of the curvature model:
             along the warp; the curvature along the weft counts by sqrt(bending_weft/bending). What has slid, the set,
@@ -190,7 +193,8 @@ def add_cloth(
     if np.size(held):
         free[indices(f"{name}.held", held, len(shape))] = False
 
-    particles = scene.add_particles(shape, 0.0)
+    speeds = None if velocity is None else finite(f"{name}.velocity", velocity, shape.shape, SceneError)
+    particles = scene.add_particles(shape, 0.0, speeds)
     size = FlatSize.add(scene, mesh, name, warp_size, weft_size, None if bending is None else bending_model)
     cut = Cut(scene, mesh, name, fabric, particles, size)
     _weigh(cut, density, drag_linear, drag_quadratic)

@@ -1,0 +1,26 @@
+"""How a motion begins."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .seen import Seen
+
+EARLY = 0.05  # s, in which the speed at the first frame is looked for
+
+
+def lets_go(s: Seen, order: Sequence[int]) -> bool:
+    """Whether the speeds of markers at the first frame are within what noise makes of none: a thing is let go there.
+    The slope of a parabola through N frames in the time T has the standard deviation sigma sqrt(192 / N) / T at its
+    end."""
+    r = s.recording
+    t = r.times - r.times[0]
+    early = np.flatnonzero(t <= EARLY)
+    x = r.positions[early][:, list(order)]
+    x = x[:, np.isfinite(x).all(axis=(0, 2))]
+    if len(early) < 6 or not x.shape[1] or not s.noise:
+        return False
+    slope = np.linalg.lstsq(np.vander(t[early], 3, increasing=True), x.reshape(len(early), -1), rcond=None)[0][1]
+    return bool(np.abs(slope).max() < 4.0 * s.noise * np.sqrt(192 / len(early)) / t[early[-1]])
