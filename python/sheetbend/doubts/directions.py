@@ -19,6 +19,7 @@ from ..statistics.blocks import short_of_frames
 from ..statistics.covariance import covariance
 from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.layout import Layout
+from ..statistics.least_squares import spanned
 from ..statistics.white_noise import white_noise
 from .driven_errors import FEW, driven_errors
 
@@ -120,8 +121,10 @@ def score(
     r: Array, J: Array, column: Array, layout: Layout, taken: float = 0.0, errors: Array | None = None
 ) -> Score | None:
     """How much of a column residuals hold beside the columns of J; None where these replace it. Arguments are those of
-    `asked_for`."""
-    beside, rank = _beside(J, column)
+    `asked_for`. What the residuals hold of the columns of J is no noise, and does not count as chance."""
+    taken_up = spanned(J)
+    rank = taken_up.shape[1]
+    beside, r = (each - taken_up @ (taken_up.T @ each) for each in (column, r))
     inner = float(beside @ beside)
     if not inner > RANK_TOLERANCE * float(column @ column) or len(layout.frame) - taken <= rank + 1:
         return None
@@ -141,20 +144,14 @@ def chance_of_drop(problem: FitProblem, u: Array, after: Array, mine: Array, dro
     """
     _, r, J = problem.evaluate(u)
     layout, taken = problem.rows_layout(), sum(map(problem.core.absorbed, range(len(problem.experiments))))
-    beside, rank = _beside(J, np.where(mine, after - r, 0.0))
+    taken_up, column = spanned(J), np.where(mine, after - r, 0.0)
+    beside, rank = column - taken_up @ (taken_up.T @ column), taken_up.shape[1]
     inner = float(beside @ beside)
     if not inner > 0.0 or len(layout.frame) - taken <= rank + 1:
         return 1.0
     errors = driven_errors(problem, u, FEW)
     told = errors if errors.size else None
     return _chance(math.sqrt(drop / inner), beside, after, layout, taken + rank, told)
-
-
-def _beside(J: Array, column: Array) -> tuple[Array, int]:
-    """What parameters cannot take up of a column, and how many of them there are."""
-    q, sizes, _ = np.linalg.svd(J / np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny), full_matrices=False)
-    q = q[:, sizes > RANK_TOLERANCE * sizes.max(initial=0.0)]
-    return column - q @ (q.T @ column), q.shape[1]
 
 
 def _chance(size: float, beside: Array, after: Array, layout: Layout, taken: float, errors: Array | None) -> float:

@@ -31,7 +31,7 @@ from ..arrays.timeseries import Array, interpolate, noise, off_neighbors
 from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
 from ..scene.boundary import Following
-from ..statistics.gauge import RANK_TOLERANCE
+from ..statistics.least_squares import spanned
 
 DRAWS = 64  # of the noise where parts of the data are compared; eight of them share a rollout
 FEW = 24  # of the noise, for intervals
@@ -120,7 +120,7 @@ def drawn_noise(problem: FitProblem, u: Array, draws: int) -> DrivenErrors | Non
     if not known:
         return None
     driven = problem.of([_following_all(e) if i in known else e for i, e in enumerate(problem.experiments)])
-    basis = _basis(problem.evaluate(u)[2])
+    basis = spanned(problem.evaluate(u)[2])
     flat: dict[int, Array] = {}
     size: dict[int, float] = {}
     moved: dict[int, Array] = {}
@@ -150,7 +150,7 @@ def _responses(problem: FitProblem, driven: FitProblem, i: int, u: Array, draws:
     them in standard errors, and |A n| is the most that it can move anything.
 
     Args:
-        basis: of what the columns of the Jacobian at u span (`_basis`), which is dear to make.
+        basis: of what the columns of the Jacobian at u span (`spanned`), which is dear to make.
     """
     known = _KNOWN.setdefault(problem, {})
     key, rows = (i, u.tobytes()), problem.core.first_rows
@@ -181,13 +181,6 @@ def _believed(problem: FitProblem, u: Array, moved: Mapping[int, Array], basis: 
         beside = errors - (errors @ basis[own]) @ basis[own].T
         found[i] = min(1.0, _share(_square(r[own]), _square(beside)), _share(*_alike(r[own], beside)))
     return found
-
-
-def _basis(J: Array) -> Array:
-    """Orthonormal, of what the columns of J span."""
-    size = np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny)
-    basis, sizes, _ = np.linalg.svd(J / size, full_matrices=False)
-    return np.asarray(basis[:, sizes > RANK_TOLERANCE * sizes.max(initial=0.0)])
 
 
 def _share(left: float, made: float) -> float:

@@ -53,22 +53,25 @@ def lost_beside_contacts(
     level = LEVEL / max(tests * len(losses), 1)
     layout, data = problem.rows_layout(), problem.core.data_rows
 
-    def clear(beside: Array, errors: Array | None = None) -> list[tuple[Told, Array, Score]]:
+    def clear(
+        losses: Sequence[tuple[Told, Array]], beside: Array, errors: Array | None = None
+    ) -> list[tuple[Told, Array, Score]]:
         each = ((one, column, score(r, beside, column, layout, errors=errors)) for one, column in losses)
         return [(one, by, asked) for one, by, asked in each if asked is not None and _chance(one, asked) < level]
 
-    if not clear(J):
+    alone = {one.label: asked for one, _, asked in clear(losses, J)}
+    if not alone:
         return None
     shifts = residual_shifts(problem, u, Refinement(finer=None if refinement is None else refinement.finer))
     known = np.column_stack([*shifts, driven_span(problem, u)])
     beside = np.hstack([J, np.vstack([known, np.zeros((len(r) - data, known.shape[1]))])])
-    found = sorted(clear(beside, _errors_beside(problem, u, known)), key=lambda each: -each[2].gain)
+    asked_again = [each for each in losses if each[0].label in alone]
+    found = sorted(clear(asked_again, beside, _errors_beside(problem, u, known)), key=lambda each: -each[2].gain)
     if not found:
         return None
     least = (1.0 - ALIKE) * found[0][2].gain - BY_CHANCE
     alike = [each for each in found if each[2].gain > least][:MOST_NAMED]
-    alone = score(r, J, alike[0][1], layout)
-    gain, mine = alike[0][2].gain if alone is None else alone.gain, rows_of(problem, group)
+    gain, mine = alone[alike[0][0].label].gain, rows_of(problem, group)
     noise, count = noise_in(r[:data], layout, mine[:data]), float(np.count_nonzero(mine))
     left = max(float(r[mine] @ r[mine]) - noise, gain)
     return Wrong(

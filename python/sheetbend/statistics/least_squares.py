@@ -25,6 +25,13 @@ def unexplained(columns: Array, wanted: Array, rcond: float | None = RANK_TOLERA
     return np.asarray(wanted - scaled @ np.linalg.lstsq(scaled, wanted, rcond=rcond)[0])
 
 
+def spanned(columns: Array) -> Array:
+    """(rows, rank) orthonormal: what columns (rows, p) span, up to `RANK_TOLERANCE` of the largest in these scales."""
+    scaled, _ = _scaled(columns)
+    basis, sizes, _ = np.linalg.svd(scaled, full_matrices=False)
+    return np.asarray(basis[:, sizes > RANK_TOLERANCE * sizes.max(initial=0.0)])
+
+
 def _scaled(columns: Array) -> tuple[Array, Array]:
     """Columns of unit length, and (p,) how long they were; a column of zeros stays."""
     size = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
