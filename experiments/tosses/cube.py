@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import sheetbend as sb
+from sheetbend.arrays.rotations import matrices_of, quaternions_of, rotation_matrix
 from sheetbend.quantities.quantities import product
 
 DATA = Path(__file__).parent / "data" / "flights.npz"
@@ -28,6 +29,17 @@ class Flight:
     positions: np.ndarray
     quaternions: np.ndarray
 
+    def steady(self, rate: float) -> Flight:
+        """In axes that do not turn, where those of the recording turn about z at a rate (rad/s)."""
+        back = np.array([rotation_matrix("turn", (0.0, 0.0, -rate * t)) for t in self.times])
+        x = np.einsum("tab,tb->ta", back, self.positions)
+        return Flight(self.name, self.times, x, quaternions_of(back @ matrices_of(self.quaternions)))
+
+    def about(self, center: np.ndarray) -> Flight:
+        """Of a point (3,) m of the cube, such as its center of mass, instead of its middle."""
+        moved = self.positions + matrices_of(self.quaternions) @ center
+        return Flight(self.name, self.times, moved, self.quaternions)
+
 
 def flights() -> list[Flight]:
     """All of them, in the order of the source."""
@@ -37,6 +49,30 @@ def flights() -> list[Flight]:
         Flight(f"toss {toss}", np.arange(b - a) / RATE, data["positions"][a:b], data["quaternions"][a:b])
         for a, b, toss in ends
     ]
+
+
+def turning(group: Sequence[Flight]) -> tuple[float, float]:
+    """How fast the axes of the recordings turn about z, rad/s, and its 95 % half-width by linear least squares.
+
+    Every flight has a start and a velocity of its own. Gravity, drag, the center of mass in the cube and the rate are
+    common to all.
+    """
+    columns, right = [], []
+    for flight in group:
+        t, x, frames = flight.times[:, None], flight.positions, matrices_of(flight.quaternions)
+        travelled = np.vstack([np.zeros(3), np.cumsum(0.5 * (x[1:] + x[:-1]), axis=0)]) / RATE
+        shared = [-0.5 * t**2 * [0.0, 0.0, 1.0], -travelled, *(-frames[:, :, k] for k in range(3))]
+        shared.append(t * np.cross([0.0, 0.0, 1.0], x))
+        own = np.linalg.qr(np.kron(np.hstack([np.ones_like(t), t]), np.eye(3)))[0]
+        every = np.stack([part.ravel() for part in (*shared, x)], axis=1)
+        every -= own @ (own.T @ every)
+        columns.append(every[:, :-1])
+        right.append(every[:, -1])
+    A, b = np.concatenate(columns), np.concatenate(right)
+    found = np.linalg.lstsq(A, b)[0]
+    left = b - A @ found
+    variance = left @ left / (len(b) - 6 * len(group) - len(found)) * np.linalg.inv(A.T @ A)[-1, -1]
+    return float(found[-1]), 1.96 * float(np.sqrt(variance))
 
 
 def scene_of(flight: Flight, gravity: float = 9.81, drag: float = DRAG) -> tuple[sb.Scene, sb.Body]:

@@ -2,17 +2,19 @@
 
     python experiments/tosses/tosses.py [--flights 62]
 
-Fits four groups of flights in the order of the source, compares what gravity says of the scale in the first and the
-second half, and predicts every flight from its first four frames with the gravity and drag that the other half shows.
+Finds how fast the axes of the recordings turn, fits four groups of flights in the order of the source, compares what
+gravity says of the scale in the first and the second half, and predicts every flight from its first four frames with
+the gravity, the drag, the center of mass and the turn of the axes that the other half shows.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 
 import numpy as np
 import sheetbend as sb
-from cube import CORNERS, RATE, SEEN, Flight, experiment, flights, parameters, scene_of
+from cube import CORNERS, RATE, SEEN, Flight, experiment, flights, parameters, scene_of, turning
 
 SHARED = ["gravity", "cube_drag", *(f"cube_center_{a}" for a in "xyz"), "cube_inertia_2", "cube_inertia_3"]
 GROUPS = 4
@@ -29,8 +31,12 @@ def pooled(values: list[tuple[float, float]]) -> tuple[float, float]:
     return float(weights @ [v for v, _ in values] / weights.sum()), float(weights.sum() ** -0.5)
 
 
-def predicted(flight: Flight, gravity: float, drag: float) -> tuple[float, float]:
-    """Errors at a flight's last frame, m and degrees, of its prediction from the first frames."""
+def predicted(
+    flight: Flight, gravity: float, drag: float, center: Sequence[float] = (0.0, 0.0, 0.0), rate: float = 0.0
+) -> tuple[float, float]:
+    """Errors at a flight's last frame, m and degrees, of its prediction from the first frames: of the center of mass,
+    and in axes that do not turn."""
+    flight = flight.steady(rate).about(np.array(center))
     scene, body = scene_of(flight, gravity, drag)
     motion = sb.simulate(scene, [0.0, float(flight.times[-1])], sb.Solver(h=1 / (4 * RATE)))
     origin, frame = body.pose(motion)
@@ -44,9 +50,12 @@ def predicted(flight: Flight, gravity: float, drag: float) -> tuple[float, float
 def main(count: int) -> None:
     every = flights()[:count]
     found: dict[str, list[tuple[float, float]]] = {name: [] for name in SHARED}
+    middle = len(every) // 2
+    rates = [turning(half) for half in (every[:middle], every[middle:])]
+    print("the axes turn about z by " + ", ".join(f"{rate:.4f} +- {half:.4f} rad/s" for rate, half in rates))
     for k in range(GROUPS):
         group = every[k * len(every) // GROUPS : (k + 1) * len(every) // GROUPS]
-        result = fitted(group)
+        result = fitted([flight.steady(rates[2 * k // GROUPS][0]) for flight in group])
         print(f"group {k + 1}: {len(group)} flights, {group[0].name} to {group[-1].name}")
         for name in SHARED:
             one = result[name]
@@ -54,13 +63,19 @@ def main(count: int) -> None:
             print(f"  {name:15s} {one.value:10.4g} +- {found[name][-1][1]:8.2g}  {one.verdict}")
     for name in SHARED:
         print(f"all: {name:15s} {pooled(found[name])[0]:10.4g} +- {pooled(found[name])[1]:8.2g}")
-    halves = [[pooled(found[q][part])[0] for q in SHARED[:2]] for part in (slice(0, 2), slice(2, 4))]
-    scales = [9.81 / g for g, _ in halves]
+    halves = [[pooled(found[q][part])[0] for q in SHARED[:5]] for part in (slice(0, 2), slice(2, 4))]
+    scales = [9.81 / values[0] for values in halves]
     apart = abs(scales[0] / scales[1] - 1)
     print(f"scale of lengths from gravity: {scales[0]:.4f} and {scales[1]:.4f}, {apart:.2%} apart")
-    middle = len(every) // 2
     errors = np.array(
-        [predicted(f, *halves[1]) for f in every[:middle]] + [predicted(f, *halves[0]) for f in every[middle:]]
+        [
+            predicted(f, gravity, drag, center, rate)
+            for part, (gravity, drag, *center), (rate, _) in (
+                (every[:middle], halves[1], rates[1]),
+                (every[middle:], halves[0], rates[0]),
+            )
+            for f in part
+        ]
     )
     for label, column, unit in (("place", 1e3 * errors[:, 0], "mm"), ("attitude", errors[:, 1], "degrees")):
         order = np.argsort(column)

@@ -13,21 +13,23 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "experiments" / "to
 
 
 def test_gravity_of_a_few_flights_predicts_the_others_from_their_first_frames() -> None:
-    from cube import experiment, flights, parameters
+    from cube import experiment, flights, parameters, turning
     from tosses import predicted
 
     every = flights()
     assert len(every) == 61
-    group = [experiment(f) for f in every[:6:2]]
+    rate, half = turning(every[:30])
+    assert rate == pytest.approx(turning(every[30:])[0], abs=0.01) and half < 0.004  # rad/s
+    group = [experiment(f.steady(rate)) for f in every[:6:2]]
     found = sb.fit(group, parameters=parameters(["gravity", "cube_inertia_2", "cube_inertia_3"]), refine=False)
     gravity = found["gravity"]
     assert gravity.value == pytest.approx(9.62, abs=0.06)
     assert found.values["cube_inertia_2"] == pytest.approx(found.values["cube_inertia_3"], rel=0.15)
     assert "cube_inertia_1" in found.report()  # what the ratios rest on
-    errors = np.array([predicted(f, gravity.value, 0.02) for f in every[30:45]])
-    assert np.median(errors[:, 0]) < 1e-3
+    errors = np.array([predicted(f, gravity.value, 0.02, (0.0, 0.0, 0.006), rate) for f in every[30:45]])
+    assert np.median(errors[:, 0]) < 0.4e-3
     assert np.median(errors[:, 1]) < 0.5
-    assert errors[:, 0].max() < 2e-3
+    assert errors[:, 0].max() < 1.6e-3
     assert errors[:, 1].max() < 2.0
 
 

@@ -21,6 +21,7 @@ from ..statistics.identifiability import Identifiability, identify
 from ..statistics.intervals import open_estimate, ran_off
 from ..statistics.judge import Nuisance
 from .driven_errors import FEW, driven_errors
+from .fitted_bodies import bodies_of
 from .floors import solver_floors
 from .profiles import Elsewhere, Profiles
 from .roughness import rough_parameters
@@ -88,6 +89,7 @@ def judged_parameters(
         errors=driven_errors(problem, u, FEW),
         limits=impossible_ahead(problem, u, r, J),
         fixes=_beyond_scenes(problem),
+        bodies=bodies_of(problem, u),
     )
     return judged, () if profiles is None else tuple(profiles.lower)
 

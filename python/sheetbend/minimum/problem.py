@@ -161,6 +161,12 @@ class FitProblem:
         values = self.parameters.to_physical(u)
         return {name: values[key] for name, key in self._keys(e).items() if key in values}
 
+    def carried_by(self, e: Experiment) -> dict[str, tuple[str, float]]:
+        """Of the quantities of an experiment's scene that are parameters: the one that carries the value, and the
+        factor to it."""
+        roots = self.parameters.roots
+        return {name: roots[key] for name, key in self._keys(e).items() if key in roots}
+
     def _keys(self, e: Experiment) -> dict[str, str]:
         """Expanded parameter name of each quantity of an experiment, whether or not it is a parameter."""
         private = {p.name for p in self.given.values() if p.private}

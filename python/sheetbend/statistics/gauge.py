@@ -147,6 +147,16 @@ def _monomial(pivot: str, name: str, power: float) -> str:
     return f"{name}/{pivot}^{power:g}" if power > 0 else f"{name} * {pivot}^{-power:g}"
 
 
+def signed_sum(labels: Sequence[str], weights: Sequence[float]) -> str:
+    """A sum in words, such as "a - 0.2 * b"; the weights are given to two digits."""
+    words = ""
+    for label, weight in zip(labels, map(_rounded, weights), strict=True):
+        size = "" if abs(weight) == 1 else f"{abs(weight):g} * "
+        sign = ("- " if weight < 0 else "+ ") if words else ("-" if weight < 0 else "")
+        words += f"{' ' if words else ''}{sign}{size}{label}"
+    return words
+
+
 def _sum(pivot: str, name: str, weight: float) -> str:
     """The combination of two parameters that a gauge (pivot +1, name +weight) leaves alone."""
     weight = _rounded(weight)

@@ -8,7 +8,7 @@ parameters costs little more.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,6 +17,7 @@ from ..arrays.timeseries import Array
 from ..errors import InputError
 from ..quantities.parameters import Parameters
 from ..result.estimate import Correlation, Estimate
+from .body_numbers import BodyNumbers
 from .gauge import RANK_TOLERANCE, Gauge
 from .judge import Floor, Judge, Linear, Nuisance
 from .layout import Layout
@@ -61,6 +62,7 @@ def identify(
     errors: Array | None = None,
     limits: Mapping[str, str] | None = None,
     fixes: Mapping[tuple[str, str], str] | None = None,
+    bodies: Sequence[BodyNumbers] = (),
     rank_tolerance: float = RANK_TOLERANCE,
 ) -> Identifiability:
     """Judge every free parameter of a finished fit.
@@ -82,6 +84,7 @@ def identify(
         limits: where parameters stopped because a body beyond is impossible, in words, by parameter.
         fixes: what to change where a parameter stops at a bound that is no user's, by parameter and side ("lower",
             "upper").
+        bodies: rigid bodies of which numbers are fitted.
         rank_tolerance: see `gauge.RANK_TOLERANCE`.
 
     Raises:
@@ -93,7 +96,9 @@ def identify(
     nuisance = nuisance or Nuisance(np.zeros((0, len(parameters.free))), 0.0)
     errors = np.zeros((len(residuals), 0)) if errors is None else errors
     limits, fixes = limits or {}, fixes or {}
-    judge = Judge(parameters, internal, residuals, jacobian, layout, rank_tolerance, nuisance, errors, limits, fixes)
+    judge = Judge(
+        parameters, internal, residuals, jacobian, layout, rank_tolerance, nuisance, errors, limits, fixes, bodies
+    )
     linear = [
         judge.linear(column, (discretization.get(name, 0.0), systematic.get(name, 0.0)))
         for column, name in enumerate(parameters.free)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from ..optional import require
 from ..quantities.parameters import Parameter, Parameters
 from ..quantities.wording import figures, floor_words, quantity, ran_off_words, side_words
 from ..result.estimate import Correlation, Estimate
+from .body_numbers import BodyNumbers, in_ten_numbers
 from .covariance import Covariance, covariance
 from .gauge import Gauge, null_space
 from .intervals import (
@@ -106,6 +107,7 @@ class Judge:
         errors: Array,
         limits: Mapping[str, str],
         fixes: Mapping[tuple[str, str], str],
+        bodies: Sequence[BodyNumbers] = (),
     ) -> None:
         self.parameters, self.internal, self.limits, self.fixes = parameters, internal, limits, fixes
         self.quantile = require("scipy.special", "fit").stdtrit
@@ -140,6 +142,8 @@ class Judge:
             self.wide_columns = unique
             self.wide, self.wide_driven = spread_of(unique)
         self.space = replace(self.space, gauges=tuple(self._measured(gauge) for gauge in self.space.gauges))
+        left = math.sqrt(self.spread.residual_variance) or 1.0
+        self.space = in_ten_numbers(self.space, self.rows / left, names, internal, log, bodies)
 
     def linear(self, column: int, more: tuple[float, float]) -> Estimate | Linear:
         """The linear interval of the parameter in that column, or its estimate where it has none; `more`:
