@@ -59,7 +59,11 @@ void sweep_vjp(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels
 }
 
 template <class T>
-void end_sweeps_vjp(const Scene& scene, const PackPlan& plan, PackCotangents<T>& bar, T* C_r_bar) {
+void end_sweeps_vjp(const Scene& scene, const PackPlan& plan, int threads, PackCotangents<T>& bar, T* w_bar,
+                    T* C_r_bar) {
+  parallel_for(plan.nodes, threads, points_per_thread, [&](int begin, int end) {
+    for (int n = begin; n < end; ++n) w_bar[n] += bar.rows.at(n)[3];
+  });
   for (std::size_t g = 0; g < plan.ghosts.size(); ++g)
     Vec3<T>(bar.rows.at(plan.nodes + static_cast<int>(g))).add_to(bar.rows.at(plan.ghosts[g]));
   for (std::size_t c = 0; c < plan.colors.size(); ++c) {
@@ -95,7 +99,7 @@ void finish(const Scene& scene, const PackPlan& plan, const Inputs<const T>& in,
                                     const Inputs<T>&, PackCotangents<T>&);                                             \
   template void sweep_vjp<T>(const PackPlan&, const sheetbend_packs::KernelTable&, int, int, int, bool, PackState<T>&, \
                              PackCotangents<T>&);                                                                      \
-  template void end_sweeps_vjp<T>(const Scene&, const PackPlan&, PackCotangents<T>&, T*);                              \
+  template void end_sweeps_vjp<T>(const Scene&, const PackPlan&, int, PackCotangents<T>&, T*, T*);                     \
   template void finish<T>(const Scene&, const PackPlan&, const Inputs<const T>&, const Inputs<T>&, PackCotangents<T>&);
 SHEETBEND_INSTANTIATE(double)
 SHEETBEND_INSTANTIATE(Pack)

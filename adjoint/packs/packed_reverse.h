@@ -27,9 +27,10 @@ template <class T>
 void sweep_vjp(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels, int threads, int grain, int iteration,
                bool last, PackState<T>& state, PackCotangents<T>& bar);
 
-// After them: C_r_bar (rows of the scene) is added to.
+// After them: the cotangents of the inverse masses w_bar (nodes) and of the references C_r_bar (rows of the scene) are added to.
 template <class T>
-void end_sweeps_vjp(const Scene& scene, const PackPlan& plan, PackCotangents<T>& bar, T* C_r_bar);
+void end_sweeps_vjp(const Scene& scene, const PackPlan& plan, int threads, PackCotangents<T>& bar, T* w_bar,
+                    T* C_r_bar);
 
 // Adds the gathered cotangents of the constraints' values to those of the inputs, and forgets them.
 template <class T>

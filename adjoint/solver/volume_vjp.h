@@ -20,8 +20,8 @@ struct VolumeCotangents {
 // added to. Of the multipliers after the last iteration nothing arrives.
 template <class T>
 void project_volumes_vjp(const Scene& scene, const Inputs<const T>& in, double eta, const T* w, int iteration,
-                         bool last, std::vector<VolumeState<T>>& states, const Coordinates<T>& q_bar,
-                         const Strided<T>& w_bar, const Inputs<T>& in_bar, std::vector<VolumeCotangents<T>>& bars) {
+                         bool last, std::vector<VolumeState<T>>& states, const Coordinates<T>& q_bar, T* w_bar,
+                         const Inputs<T>& in_bar, std::vector<VolumeCotangents<T>>& bars) {
   for (int i = static_cast<int>(states.size()) - 1; i >= 0; --i) {
     const Volume& volume = scene.volumes[i];
     const std::vector<int>& nodes = volume.nodes;
@@ -38,7 +38,7 @@ void project_volumes_vjp(const Scene& scene, const Inputs<const T>& in, double e
     in_bar.of(Quantity::volume_compliance)[i] -= y * (record.lambda + record.dl) * T(1.0 / (eta * eta));
     for (std::size_t k = 0; k < nodes.size(); ++k) {
       const Vec3<T> z = Vec3<T>(q_bar.of(nodes[k])) - y * g[k];
-      w_bar.of(nodes[k]) += record.dl * dot(g[k], z);
+      w_bar[nodes[k]] += record.dl * dot(g[k], z);
       bar.v[k] = (w[nodes[k]] * record.dl) * (z - y * g[k]);
       z.store(q_bar.of(nodes[k]));
     }

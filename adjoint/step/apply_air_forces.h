@@ -51,7 +51,7 @@ struct ReverseOf<ApplyAirForces> {
       for (const int n : scene.air[i]) {
         if (!scene.inertial[n]) continue;
         const Vec3<T> v_star_bar = eta * Vec3<T>(bar.q.of(n));
-        bar.w.of(n) += dot(impulse, v_star_bar);
+        bar.w[n] += dot(impulse, v_star_bar);
         impulse_bar = impulse_bar + work.masses.w[n] * v_star_bar;
       }
       const AirTriangle<T> at_bar = air_force_vjp(at, force, share * impulse_bar);

@@ -52,7 +52,7 @@ struct ReverseOf<ApplyLoads> {
     const Scene& scene = step.scene;
     if (scene.loads.empty()) return;
     RowLoads<T>(step).for_each_push([&](int n, const Vec3<T>& push) {
-      if (scene.inertial[n]) bar.w.of(n) += dot(push, Vec3<T>(bar.q.of(n)));
+      if (scene.inertial[n]) bar.w[n] += dot(push, Vec3<T>(bar.q.of(n)));
     });
     const Vec3<T> none(T(0.0), T(0.0), T(0.0));
     row_loads_vjp(

@@ -48,7 +48,7 @@ struct ReverseOf<CarryFriction> {
           source, contact, i, in_frame_vjp(poses.next[contact.collider], x, z_bar, poses_bar.next[contact.collider]),
           at, [&](int node) { return bar.x_next + scene.first_dof[node]; }, bar.in);
       numbers_vjp(source, poses, c, i, numbers_bar, poses_bar, bar.from, bar.in,
-                  [&](int node) -> T& { return bar.w.of(node); });
+                  [&](int node) -> T& { return bar.w[node]; });
     });
     if (last) poses_vjp(*last, poses_bar, bar.in);
     // They were written, whatever they were before.

@@ -58,7 +58,7 @@ struct ReverseOf<CarryPairFriction> {
             inverse_mass_vjp(
                 of.spots, pair.spots[k], w_bar[k], [&](int p) { return of.inverse_mass(p); },
                 [&](int p, const S& own) {
-                  if (p < block.movable) source.add(own, bar.w.of(block.particles[p]));
+                  if (p < block.movable) source.add(own, bar.w[block.particles[p]]);
                 },
                 add_to_weight);
           }

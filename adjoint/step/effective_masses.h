@@ -8,19 +8,18 @@ namespace sheetbend {
 
 template <>
 struct ReverseOf<ComputeEffectiveMasses> {
-  // Cotangents of what the stage computes. Where colors go through kernels, those of w stand in their rows.
+  // Cotangents of what the stage computes.
   template <class T>
   struct Scratch {
     std::vector<T> w, kept, w_of_forces;
 
-    void resize(const Scene& scene, const Plan& plan) {
-      if (!sweeps_packs<T>(plan)) w.resize(scene.nodes());
+    void resize(const Scene& scene, const Plan&) {
+      w.resize(scene.nodes());
       if (scene.has_drag) kept.resize(scene.nodes());
       w_of_forces.resize(scene.loaded.size());
     }
-    static std::size_t bytes(const Scene& scene, const Plan& plan) {
-      const std::size_t nodes = scene.nodes();
-      return sizeof(T) * ((sweeps_packs<T>(plan) ? 0 : nodes) + (scene.has_drag ? nodes : 0) + scene.loaded.size());
+    static std::size_t bytes(const Scene& scene, const Plan&) {
+      return sizeof(T) * ((scene.has_drag ? 2 : 1) * static_cast<std::size_t>(scene.nodes()) + scene.loaded.size());
     }
   };
 
@@ -31,14 +30,14 @@ struct ReverseOf<ComputeEffectiveMasses> {
     const T* w = work.masses.w.data();
     T* mass_bar = bar.in.of(Quantity::mass);
     const char* inertial = scene.inertial.data();
-    const Strided<T> w_bar = bar.w;
+    const T* w_bar = bar.w;
     parallel_for(scene.nodes(), step.threads(), points_per_thread, [=](int begin, int end) {
       for (int n = begin; n < end; ++n)
-        if (inertial[n]) mass_bar[n] -= w[n] * w[n] * w_bar.of(n);
+        if (inertial[n]) mass_bar[n] -= w[n] * w[n] * w_bar[n];
     });
     const T eta(step.bdf.eta);
     for (const Director& d : scene.directors)
-      if (scene.role[d.node] == Role::free) mass_bar[d.node] -= w[d.node] * w[d.node] * eta * eta * w_bar.of(d.node);
+      if (scene.role[d.node] == Role::free) mass_bar[d.node] -= w[d.node] * w[d.node] * eta * eta * w_bar[d.node];
     for (std::size_t i = 0; i < scene.loaded.size(); ++i) {
       const int n = scene.loaded[i];
       if (inertial[n]) mass_bar[n] -= w[n] * w[n] * bar.w_of_forces[i];
@@ -58,7 +57,7 @@ struct ReverseOf<ComputeEffectiveMasses> {
       bar.in.of(Quantity::mass)[n] += w[n] * (T(1.0) - masses.kept[n]) * bar.kept[n];
       T momentum_bar = step.in.of(Quantity::mass)[n] * bar.kept[n];
       if (slot >= 0) momentum_bar += bar.w_of_forces[slot];
-      const T m_eff_bar = -(w[n] * w[n] * (bar.w.of(n) + momentum_bar));
+      const T m_eff_bar = -(w[n] * w[n] * (bar.w[n] + momentum_bar));
       const Vec3<T> v = extrapolated(step.bdf, step.from.v + dof, step.from.v_before + dof);
       const T v2 = dot(v, v), speed = sqrt_or_zero(v2);
       bar.in.of(Quantity::drag_linear)[n] += eta * m_eff_bar;

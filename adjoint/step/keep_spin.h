@@ -103,7 +103,7 @@ struct ReverseOf<KeepSpin> {
       if (scene.has_drag) {
         const T lost = one / masses.w[n] - mass[n], of_drag = dot(v, F_bar);
         v_bar = v_bar - (eta * lost) * F_bar;
-        bar.w.of(n) += (eta / (masses.w[n] * masses.w[n])) * of_drag;
+        bar.w[n] += (eta / (masses.w[n] * masses.w[n])) * of_drag;
         mass_bar[n] += eta * of_drag;
       }
       (a_bar + rate * v_bar).add_to(bar.x_next + dof);

@@ -53,7 +53,7 @@ void ReverseOf<ProjectBlocks>::run(const Step<T>& step, const Work<T>& work, Pro
       else
         for (int iteration = plan.options.iterations - 1; iteration >= 0; --iteration)
           project_block_vjp(state, block, pack_kernels(), record.blocks[b], iteration, block_bar);
-      end_block_vjp(state, block, bar.q.data, bar.w.data, block_bar);
+      end_block_vjp(state, block, bar.q.data, bar.w, block_bar);
       damping_references_vjp(state, block, pack_kernels(), step.bdf.before, record.blocks[b], bar.from.x,
                              bar.from.x_before, block_bar);
     }
@@ -71,7 +71,7 @@ void ReverseOf<ProjectBlocks>::run(const Step<T>& step, const Work<T>& work, Pro
     for (std::size_t lane = 0; lane < contacts.size(); ++lane) {
       const auto source = contact_source(step, work.masses, static_cast<int>(lane));
       spread_contacts(source, plan.blocks[b], record.blocks[b].contacts[lane], contacts[lane], bar.from, bar.in,
-                      [&](int node) -> T& { return bar.w.of(node); });
+                      [&](int node) -> T& { return bar.w[node]; });
       spread_friction(source, plan.blocks[b], scratch.blocks[b].friction[lane], bar.from, bar.in);
     }
   }

@@ -23,7 +23,7 @@ struct StepCotangents {
   T* x_next;                 // of x_next (dofs); used up
   const T* v_next;           // of v_next (dofs)
   Coordinates<T> q;          // of the coordinates while they are corrected; those of x_next and v_next end here
-  Strided<T> w;              // of the effective inverse masses, accumulated
+  T* w;                      // of the effective inverse masses, accumulated
   T* kept;                   // of InverseMasses::kept, of what has inertia
   T* w_of_forces;            // per loaded particle, of its w as the forces see it: added to mass and drag after `w`
   StateCotangents<T> from;   // of the states at n and n-1, added to

@@ -1,8 +1,9 @@
-// The reverse of SweepColors: sweeps in reverse order, then the damping references.
+// The reverse of SweepColors: sweeps in reverse order, then what contacts were made of and the damping references.
 #pragma once
 
 #include "adjoint/packs/packed_reverse.h"
 #include "adjoint/solver/project_vjp.h"
+#include "adjoint/solver/swept_contacts_vjp.h"
 #include "adjoint/solver/volume_vjp.h"
 #include "adjoint/step/stages.h"
 #include "core/step/sweep_colors.h"
@@ -17,10 +18,13 @@ struct ReverseOf<SweepColors> {
     std::vector<T> fixed, lambda;                                      // of others
     std::vector<T> C_r;
     std::vector<VolumeCotangents<T>> volumes;
+    std::vector<SweptContactCotangents<Single<T>>> contacts;
 
     void resize(const Scene& scene, const Plan& plan) {
       volumes.resize(swept_volumes(scene, plan).size());
       for (std::size_t v = 0; v < volumes.size(); ++v) volumes[v].resize(scene.volumes[v]);
+      contacts.resize(plan.contacts.empty() ? 0 : scenes_of<T>);
+      for (auto& own : contacts) own.resize(scene, plan);
       if (plan.colors.empty()) return;
       C_r.resize(damped_rows(scene));
       if constexpr (in_packs<T>) {
@@ -34,6 +38,9 @@ struct ReverseOf<SweepColors> {
       std::size_t sum = 0;
       for (const Volume& volume : swept_volumes(scene, plan))
         sum += sizeof(VolumeCotangents<T>) + VolumeCotangents<T>::bytes(volume);
+      if (!plan.contacts.empty())
+        sum += scenes_of<T> *
+               (sizeof(SweptContactCotangents<Single<T>>) + SweptContactCotangents<Single<T>>::bytes(scene, plan));
       if (plan.colors.empty()) return sum;
       sum += sizeof(T) * damped_rows(scene);
       if constexpr (in_packs<T>)
@@ -42,16 +49,11 @@ struct ReverseOf<SweepColors> {
         return sum + sizeof(T) * (scene.stencil_coordinates + scene.rows);
     }
 
-    // Where the cotangents of the coordinates and of the inverse masses are: in the kernels' rows, or in q and w.
+    // Where the cotangents of the coordinates are: in the kernels' rows, or in q.
     Coordinates<T> of_coordinates(const Plan& plan, T* q) {
       if constexpr (in_packs<T>)
         if (sweeps_packs<T>(plan)) return {packs.rows.at(0), sheetbend_packs::row};
       return {q, 3};
-    }
-    Strided<T> of_inverse_masses(const Plan& plan, T* w) {
-      if constexpr (in_packs<T>)
-        if (sweeps_packs<T>(plan)) return {packs.rows.at(0) + 3, sheetbend_packs::row};
-      return {w, 1};
     }
   };
 
@@ -77,7 +79,7 @@ struct ReverseOf<SweepColors> {
     } else {
       const SubstepState<T> state = SweepColors::state_of<T>(step, work.masses, nullptr, record);
       const SubstepCotangent<T> cotangent{bar.q.data, scratch.fixed.data(), scratch.lambda.data(),
-                                          bar.w.data, scratch.C_r.data(),   bar.in};
+                                          bar.w,      scratch.C_r.data(),   bar.in};
       for (auto color = plan.colors.rbegin(); color != plan.colors.rend(); ++color)
         project_color_vjp(state, o, *color, record.iterations[iteration], cotangent);
     }
@@ -85,10 +87,10 @@ struct ReverseOf<SweepColors> {
 
   // Adds what fixed nodes received, per stencil, to their own.
   template <class T>
-  static void end(const Step<T>& step, Scratch<T>& scratch, [[maybe_unused]] const StepCotangents<T>& bar) {
+  static void end(const Step<T>& step, Scratch<T>& scratch, const StepCotangents<T>& bar) {
     const Scene& scene = step.scene;
     if constexpr (in_packs<T>) {
-      end_sweeps_vjp(scene, step.plan.packs, scratch.packs, scratch.C_r.data());
+      end_sweeps_vjp(scene, step.plan.packs, step.threads(), scratch.packs, bar.w, scratch.C_r.data());
     } else {
       for (const Group& group : scene.groups)
         for (int i = 0; i < group.count; ++i)
@@ -109,16 +111,25 @@ void ReverseOf<SweepColors>::run(const Step<T>& step, const Work<T>& work, Sweep
   const bool swept = !step.plan.colors.empty();
   for (auto* buffer : {&scratch.C_r, &scratch.fixed, &scratch.lambda})
     std::fill(buffer->begin(), buffer->end(), T(0.0));
+  for (auto& contacts : scratch.contacts) contacts.clear();
   if constexpr (in_packs<T>)
     if (swept) begin_sweeps_vjp(step.scene, step.plan.packs, o.threads, step.in, record.packs, bar.in, scratch.packs);
   for (int iteration = o.iterations - 1; iteration >= 0; --iteration) {
     const bool last = iteration == o.iterations - 1;
+    SweepColors::for_each_scene(step, work.masses, record.contacts, [&](const auto& source, auto& contacts) {
+      project_contacts_vjp(source, step.plan, iteration, contacts, bar.q, bar.w, scratch.contacts[source.lane]);
+    });
     project_volumes_vjp(step.scene, step.in, step.bdf.eta, work.masses.w.data(), iteration, last, record.volumes, bar.q,
                         bar.w, bar.in, scratch.volumes);
     sweep(step, work, iteration, last, record, scratch, bar);
   }
+  SweepColors::for_each_scene(step, work.masses, record.contacts, [&](const auto& source, auto& contacts) {
+    spread_contacts(source, step.plan, contacts, scratch.contacts[source.lane], bar.from, bar.in, bar.w);
+  });
   if (!swept) return;
   end(step, scratch, bar);
+  // In a pack, scenes go with either formula in other substeps than alone: sums over substeps would have other bits.
+  if (changes_at_contacts(step.scene, o)) finish(step.scene, step.plan, step.in, scratch, bar.in);
   damping_references_vjp(step.scene, step.in, step.bdf, step.from, scratch.C_r.data(), bar.from, bar.in);
 }
 

@@ -56,6 +56,29 @@ ContactNumbers<U> constants(const ContactNumbers<T>& c) {
   return u;
 }
 
+template <class T>
+Vec3<double> values_of(const Vec3<T>& v) {
+  return {value_of(v.x), value_of(v.y), value_of(v.z)};
+}
+
+// Their values.
+template <class T>
+ContactNumbers<double> values_of(const ContactNumbers<T>& c) {
+  ContactNumbers<double> v{values_of(c.from),
+                           values_of(c.carried),
+                           value_of(c.friction),
+                           value_of(c.radius),
+                           value_of(c.kappa),
+                           {},
+                           value_of(c.lift),
+                           value_of(c.leaving),
+                           value_of(c.loss),
+                           c.dissipates,
+                           c.firm};
+  for (int k = 0; k < most_sizes; ++k) v.size[k] = value_of(c.size[k]);
+  return v;
+}
+
 // A = -d force/dz, row by row, with or without the curvature of the shape: without it the normal stays, as Newton's method may have it. Returns
 // what acts.
 inline Touch<double> touch_matrix(const AnyShape& shape, const Vec3<double>& z, const ContactNumbers<double>& c,

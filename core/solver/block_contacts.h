@@ -63,22 +63,15 @@ struct BlockContacts {
 // The values of what a scalar carries more than a value of.
 template <class S>
 void take_values(const BlockContacts<S>& c, BlockContacts<double>& all) {
-  const auto vector = [](const Vec3<S>& v) { return Vec3<double>(value_of(v.x), value_of(v.y), value_of(v.z)); };
   all.poses.next.resize(c.poses.next.size());
   for (std::size_t i = 0; i < c.poses.next.size(); ++i) {
     const Pose<S>& pose = c.poses.next[i];
     Pose<double>& to = all.poses.next[i];
-    to.position = vector(pose.position);
+    to.position = values_of(pose.position);
     for (int k = 0; k < 9; ++k) to.turn[k] = value_of(pose.turn[k]);
   }
   for (std::size_t i = 0; i < c.numbers.size(); ++i) {
-    const ContactNumbers<S>& n = c.numbers[i];
-    ContactNumbers<double>& to = all.numbers[i];
-    to.from = vector(n.from), to.carried = vector(n.carried);
-    to.friction = value_of(n.friction), to.radius = value_of(n.radius), to.kappa = value_of(n.kappa);
-    for (int k = 0; k < most_sizes; ++k) to.size[k] = value_of(n.size[k]);
-    to.loss = value_of(n.loss), to.dissipates = n.dissipates;
-    to.lift = value_of(n.lift), to.leaving = value_of(n.leaving), to.firm = n.firm;
+    all.numbers[i] = values_of(c.numbers[i]);
     for (int k = 0; k < most_point_nodes; ++k) all.weights[i][k] = value_of(c.weights[i][k]);
   }
 }

@@ -155,6 +155,13 @@ struct ContactSource {
                               falling(poses, contact, item));
   }
 
+  void read_size(const Collider& collider, S* size) const {
+    with_shape(collider.shape, [&]<class Shape>(Shape) {
+      for (int k = 0; k < size_count<Shape>; ++k)
+        size[k] = read(in.of(Quantity::collider_size)[collider.first_size + k]);
+    });
+  }
+
   // The gap of a point at x from a contact's surface, with its collider at a pose.
   S gap(const Pose<S>& pose, int contact, const Vec3<S>& x) const {
     const Collider& collider = scene.colliders[scene.contacts[contact].collider];
@@ -163,14 +170,6 @@ struct ContactSource {
     pose.in_frame(x).store(at);
     distance_from(collider.any(), at, size, distance, n);
     return distance - read(in.of(Quantity::contact_radius)[contact]);
-  }
-
- private:
-  void read_size(const Collider& collider, S* size) const {
-    with_shape(collider.shape, [&]<class Shape>(Shape) {
-      for (int k = 0; k < size_count<Shape>; ++k)
-        size[k] = read(in.of(Quantity::collider_size)[collider.first_size + k]);
-    });
   }
 };
 

@@ -241,6 +241,16 @@ std::vector<int> loose_beside(const Scene& scene, const std::vector<Member>& mem
   return {loose.begin(), loose.end()};
 }
 
+// The contacts of movable particles.
+std::vector<SweptContact> swept_contacts(const Scene& scene) {
+  std::vector<SweptContact> contacts;
+  for (int c = 0; c < static_cast<int>(scene.contacts.size()); ++c)
+    for (int i = 0; i < scene.contacts[c].points(); ++i)
+      if (const Contact& own = scene.contacts[c]; moves(scene, own, i))
+        contacts.push_back({c, i, own.first_node(i), own.collider, scene.colliders[own.collider].any()});
+  return contacts;
+}
+
 // The movable particles of contacts that are in none of these blocks.
 std::vector<int> loose_in_contact(const Scene& scene, const std::vector<DirectBlock>& blocks) {
   std::vector<char> known(scene.nodes(), false);
@@ -370,13 +380,14 @@ Plan make_plan(const Scene& scene, const SolverOptions& options) {
   if (options.partition == Partition::gauss_seidel) {
     plan.colors = color_constraints(scene);
     plan.packs = pack_colors(scene, plan.colors);
-  } else {
-    auto chains = connected_chains(scene);
-    join_what_touches(scene, chains);
-    for (auto& members : chains) {
-      const std::vector<int> loose = loose_beside(scene, members);
-      plan.blocks.push_back(make_block(scene, std::move(members), options, loose));
-    }
+    plan.contacts = swept_contacts(scene);
+    return plan;
+  }
+  auto chains = connected_chains(scene);
+  join_what_touches(scene, chains);
+  for (auto& members : chains) {
+    const std::vector<int> loose = loose_beside(scene, members);
+    plan.blocks.push_back(make_block(scene, std::move(members), options, loose));
   }
   if (const std::vector<int> loose = loose_in_contact(scene, plan.blocks); !loose.empty())
     plan.blocks.push_back(make_block(scene, {}, options, loose));

@@ -77,11 +77,19 @@ struct DirectBlock {
   bool banded() const { return !condensation && structure.banded(); }
 };
 
+// A particle that may touch a collider, and goes by sweeps (swept_contacts.h).
+struct SweptContact {
+  int contact, item;  // in the scene
+  int node, collider;
+  AnyShape shape;
+};
+
 struct Plan {
   SolverOptions options;
   std::vector<Color> colors;
   PackPlan packs;  // the same colors, eight constraints at a time
   std::vector<DirectBlock> blocks;
+  std::vector<SweptContact> contacts = {};  // between sweeps, in the order of the scene
 };
 
 // Iterations over blocks and colors that a record for the reverse holds; an implicit step is known by where it ends.

@@ -42,16 +42,28 @@ void expect_no_volume(const Scene& scene) {
                                 "or gauss_seidel, or give a pressure instead");
 }
 
-// Contact stands in the balance of forces, which only implicit substeps find.
-void expect_no_contact(const Scene& scene) {
+void expect_no_self_contact(const Scene& scene) {
   if (!scene.self_contact.empty())
     throw std::invalid_argument(
         "solver.method: ropes, cloths or bodies may touch each other, which needs substeps whose forces balance. Fix: "
-        "use "
-        "implicit");
+        "use implicit");
+}
+
+// Contact stands in the balance of forces, which implicit substeps find, or is projected between sweeps.
+void expect_no_contact(const Scene& scene) {
   if (!scene.contacts.empty())
-    throw std::invalid_argument("solver.method: particles of " + scene.contacts.front().name +
-                                " may touch a collider, which needs substeps whose forces balance. Fix: use implicit");
+    throw std::invalid_argument(
+        "solver.method: particles of " + scene.contacts.front().name +
+        " may touch a collider, which needs substeps whose forces balance. Fix: use implicit, or "
+        "gauss_seidel for cloth in many short substeps");
+}
+
+// Sweeps project particles out of colliders.
+void expect_contact_of_particles(const Scene& scene) {
+  for (const Contact& contact : scene.contacts)
+    if (contact.arity > 1)
+      throw std::invalid_argument("solver.method: points of bodies in " + contact.name +
+                                  " may touch a collider, which sweeps do not project. Fix: use implicit");
 }
 
 // Blocks are made of constraints and what they join.
@@ -90,7 +102,11 @@ void check_solver(const Scene& scene, const SolverOptions& options) {
     expect_balanced(scene);
     expect_no_volume(scene);
   } else {
-    expect_no_contact(scene);
+    expect_no_self_contact(scene);
+    if (options.partition == Partition::gauss_seidel)
+      expect_contact_of_particles(scene);
+    else
+      expect_no_contact(scene);
   }
   if (scene.keeps_spin && options.partition != Partition::direct)
     throw std::invalid_argument(

@@ -48,16 +48,21 @@ struct CarryFriction {
     for_each_contact(step, work.masses, [&](const auto& source, const auto& poses, int c, int i) {
       using S = Single<T>;
       const Contact& contact = scene.contacts[c];
-      const auto z = poses.next[contact.collider].in_frame(source.point(contact, i, work.x_next));
+      const auto x = source.point(contact, i, work.x_next);
+      ContactMode& mode = record.modes[source.lane * count + contact.first + i];
+      T* const kept = work.x_next + scene.first_dof[contact.carried[i]];
+      if (!contact.rebounds(i) && !(value_of(source.gap(poses.next[contact.collider], c, x)) < 0.0)) {
+        mode = ContactMode::apart;
+        return source.write(Vec3<S>(S(0.0), S(0.0), S(0.0)), kept);
+      }
+      const auto z = poses.next[contact.collider].in_frame(x);
       const AnyShape shape = scene.colliders[contact.collider].any();
       const auto numbers = source.numbers(poses, c, i);
       const auto found = touch(shape, z, numbers);
       auto carried = S(rate) * found.tangential;
       if (found.pushes && contact.rebounds(i)) carried = carried + numbers.leaving * normal_at(shape, z, numbers.size);
-      source.write(carried, work.x_next + scene.first_dof[contact.carried[i]]);
-      record.modes[source.lane * count + contact.first + i] = !found.pushes  ? ContactMode::apart
-                                                              : found.slides ? ContactMode::slides
-                                                                             : ContactMode::sticks;
+      source.write(carried, kept);
+      mode = !found.pushes ? ContactMode::apart : found.slides ? ContactMode::slides : ContactMode::sticks;
     });
   }
 };

@@ -1,4 +1,5 @@
-// The projection of colors: sweeps over constraints one by one (nonlinear Gauss-Seidel), and over the volumes that are kept, after each sweep.
+// The projection of colors: sweeps over constraints one by one (nonlinear Gauss-Seidel), and after each sweep over the volumes that are kept and the
+// particles that touch colliders.
 #pragma once
 
 #include <algorithm>
@@ -7,6 +8,7 @@
 #include "core/scalar/dual.h"
 #include "core/scalar/pack.h"
 #include "core/solver/project.h"
+#include "core/solver/swept_contacts.h"
 #include "core/solver/volume.h"
 #include "core/step/stages.h"
 
@@ -26,6 +28,7 @@ struct SweepColors {
     std::vector<IterationRecord<T>> iterations;                   // of others
     std::vector<T> C_r, lambda;                                   // damping references; the others' multipliers
     std::vector<VolumeState<T>> volumes;
+    std::vector<SweptContacts<Single<T>>> contacts;  // of each scene of a T; none where nothing may touch
 
     void resize(const Scene& scene, const Plan& plan, bool reversed);
     static std::size_t bytes(const Scene& scene, const Plan& plan, bool reversed);
@@ -49,10 +52,11 @@ struct SweepColors {
     }
   };
 
-  // Scenes with volumes have one section.
+  // Scenes with volumes or contacts have one section.
   template <class T>
   static Sections sections(const Scene& scene, const Plan& plan, int kept) {
-    return scene.volumes.empty() ? sections_of<T>(plan.packs, kept) : Sections{kept, kept};
+    const bool plain = scene.volumes.empty() && plan.contacts.empty();
+    return plain ? sections_of<T>(plan.packs, kept) : Sections{kept, kept};
   }
 
   template <class T>
@@ -68,6 +72,14 @@ struct SweepColors {
         std::copy(record.lambda.begin(), record.lambda.end(), lambda);
     }
     for (std::size_t v = 0; v < record.volumes.size(); ++v) lambda[scene.rows + v] = record.volumes[v].lambda;
+  }
+
+  // Calls f(source, contacts) for the contacts of every scene that is solved.
+  template <class T, class F>
+  static void for_each_scene(const Step<T>& step, const InverseMasses<T>& masses,
+                             std::vector<SweptContacts<Single<T>>>& contacts, F&& f) {
+    for (int scene = 0; scene < static_cast<int>(contacts.size()); ++scene)
+      if (has(step.scenes, scene)) f(contact_source(step, masses, scene), contacts[scene]);
   }
 
   // The substep as single constraints see it.
@@ -106,6 +118,8 @@ void SweepColors::Record<T>::resize(const Scene& scene, const Plan& plan, bool r
   const int kept = kept_iterations(plan, reversed);
   volumes.resize(swept_volumes(scene, plan).size());
   for (std::size_t v = 0; v < volumes.size(); ++v) volumes[v].resize(scene.volumes[v], kept);
+  contacts.resize(plan.contacts.empty() ? 0 : scenes_of<T>);
+  for (auto& own : contacts) own.resize(plan, kept);
   if (plan.colors.empty()) return;
   C_r.resize(damped_rows(scene));
   if constexpr (in_packs<T>) {
@@ -123,6 +137,8 @@ std::size_t SweepColors::Record<T>::bytes(const Scene& scene, const Plan& plan, 
   std::size_t sum = 0;
   for (const Volume& volume : swept_volumes(scene, plan))
     sum += sizeof(VolumeState<T>) + VolumeState<T>::bytes(volume, kept);
+  if (!plan.contacts.empty())
+    sum += scenes_of<T> * (sizeof(SweptContacts<Single<T>>) + SweptContacts<Single<T>>::bytes(scene, plan, kept));
   if (plan.colors.empty()) return sum;
   sum += sizeof(T) * damped_rows(scene);
   if constexpr (in_packs<T>)
@@ -137,10 +153,15 @@ void SweepColors::forward(const Step<T>& step, Work<T>& work, Record<T>& record)
   const bool swept = !step.plan.colors.empty();
   T* q = work.x_next;
   if (swept) begin(step, work, q, record);
+  for_each_scene(step, work.masses, record.contacts,
+                 [&](const auto& source, auto& contacts) { contacts.begin(source, step.plan); });
   record.with_coordinates(step.plan, q, [&](auto at) {
     for (int iteration = 0; iteration < step.plan.options.iterations; ++iteration) {
       sweep(step, work, iteration, q, record);
       project_volumes(scene, step.in, step.bdf.eta, work.masses.w.data(), iteration, at, record.volumes);
+      for_each_scene(step, work.masses, record.contacts, [&](const auto& source, auto& contacts) {
+        project_contacts(source, step.plan, iteration, at, contacts);
+      });
     }
   });
   if constexpr (in_packs<T>)

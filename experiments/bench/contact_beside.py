@@ -1,12 +1,13 @@
 """Contact in this package and in newton on the same scene, in one run: time, error at the end, gradients.
 
-    python experiments/bench/contact_beside.py FOLDER [--scenes rope cloth] [--columns 32] [--peers ...] [--forward]
+    python experiments/bench/contact_beside.py FOLDER [--scenes rope cloth] [--columns 32] [--methods ...] [--peers ...]
 
-FOLDER holds the environment `newton` (setup_peers.sh FOLDER newton). Peers are its solvers: semi_implicit (default),
-xpbd, vbd. Times are processor time of one thread. The error is the largest distance of a particle, at the end, from a
-run of the same program at an eighth of its shortest substep, for semi_implicit of its law in double precision.
-Gradients are of one number, a weighted sum of the positions at the end, with respect to the logarithms of friction and
-of all stiffnesses, and along a direction of the start and of its velocities. `--forward` leaves them out.
+FOLDER holds the environment `newton` (setup_peers.sh FOLDER newton). Methods are this package's: implicit, and for the
+cloth gauss_seidel with two sweeps. Peers are newton's solvers: semi_implicit (default), xpbd, vbd. Times are processor
+time of one thread. The error is the largest distance of a particle, and the median, at the end, from a run of the same
+program at an eighth of its shortest substep, for semi_implicit of its law in double precision. Gradients are of one
+number, a weighted sum of the positions at the end, with respect to the logarithms of friction and of all stiffnesses,
+and along a direction of the start and of its velocities. `--forward` leaves them out.
 Prints tables in Markdown.
 """
 
@@ -43,23 +44,26 @@ class Row:
     h: float
     forward: float
     error: float
+    median: float  # of all particles
     with_gradient: float | None  # None and empty where it was not asked for
     gradient: dict[str, float]
     differences: dict[str, float]
 
 
-def solver(h: float) -> sb.Solver:
-    return sb.Solver(h=h, method="implicit")
+SOLVERS: dict[str, dict[str, Any]] = {
+    "implicit": {"method": "implicit"},
+    "gauss_seidel": {"method": "gauss_seidel", "iterations": 2},
+}
 
 
-def ends(s: Springs, h: float) -> np.ndarray:
-    return sb.simulate(built(s), [0.0, s.seconds], solver(h)).positions[-1]
+def ends(s: Springs, method: str, h: float) -> np.ndarray:
+    return sb.simulate(built(s), [0.0, s.seconds], sb.Solver(h=h, **SOLVERS[method])).positions[-1]
 
 
-def gradient(s: Springs, h: float) -> dict[str, float]:
+def gradient(s: Springs, method: str, h: float) -> dict[str, float]:
     """Of the loss, by `STEPS`' names."""
     scene = built(s)
-    run = sb.rollout(scene, [0.0, s.seconds], solver(h))
+    run = sb.rollout(scene, [0.0, s.seconds], sb.Solver(h=h, **SOLVERS[method]))
     bar = run.gradient(np.stack([0.0 * s.seed, s.seed]))
     of = bar.inputs
     return {
@@ -68,6 +72,12 @@ def gradient(s: Springs, h: float) -> dict[str, float]:
         "start": float((of["position"] * s.direction).sum()),
         "velocity": float((of["velocity"] * s.direction).sum()),
     }
+
+
+def difference(s: Springs, method: str, h: float, name: str, d: float) -> float:
+    """The same derivative as a central difference."""
+    there, back = (ends(changed(s, name, by), method, h) for by in (d, -d))
+    return float((s.seed * (there - back)).sum() / (2 * d))
 
 
 def timed(work: Callable[[], object]) -> float:
@@ -80,19 +90,17 @@ def timed(work: Callable[[], object]) -> float:
     return min(seconds)
 
 
-def ours(s: Springs, substeps: Sequence[float], forward: bool = False) -> Iterator[Row]:
-    finest = ends(s, min(substeps) / FINER)
+def ours(s: Springs, method: str, substeps: Sequence[float], forward: bool = False) -> Iterator[Row]:
+    program = f"sheetbend {method}"
+    finest = ends(s, method, min(substeps) / FINER)
     for h in substeps:
-        error, seconds = distance(ends(s, h), finest), timed(partial(ends, s, h))
+        errors, seconds = distances(ends(s, method, h), finest), timed(partial(ends, s, method, h))
         if forward:
-            yield Row("sheetbend", h, seconds, error, None, {}, {})
+            yield Row(program, h, seconds, *errors, None, {}, {})
             continue
-        by_difference = {
-            name: float((s.seed * (ends(changed(s, name, d), h) - ends(changed(s, name, -d), h))).sum() / (2 * d))
-            for name, d in STEPS.items()
-        }
-        both = timed(partial(gradient, s, h))
-        yield Row("sheetbend", h, seconds, error, both, gradient(s, h), by_difference)
+        by_difference = {name: difference(s, method, h, name, d) for name, d in STEPS.items()}
+        both = timed(partial(gradient, s, method, h))
+        yield Row(program, h, seconds, *errors, both, gradient(s, method, h), by_difference)
 
 
 def newtons(s: Springs, kind: str, substeps: Sequence[float], folder: Path, forward: bool) -> Iterator[Row]:
@@ -118,34 +126,39 @@ def newtons(s: Springs, kind: str, substeps: Sequence[float], folder: Path, forw
                 f"newton {t['version']} {kind}",
                 h,
                 t["forward_s"],
-                distance(np.array(t["end"]), finest),
+                *distances(np.array(t["end"]), finest),
                 t.get("gradient_s"),
                 t.get("gradient", {}),
                 t.get("differences", {}),
             )
     if kind == "semi_implicit":
-        apart = distance(finest, ends(s, min(SUBSTEPS[s.sphere > 0]["sheetbend"]) / FINER))
+        apart, _ = distances(finest, ends(s, "implicit", min(SUBSTEPS[s.sphere > 0]["implicit"]) / FINER))
         print(f"\nBoth programs at their shortest substeps over {FINER} end {1e3 * apart:.2g} mm apart.")
 
 
 # By whether there is a sphere [s].
 PEERS = ("semi_implicit", "xpbd", "vbd")
 SUBSTEPS = {
-    False: {"sheetbend": (1e-2, 2.5e-3, 5e-4, 1e-4), **dict.fromkeys(PEERS, (1.5e-4, 1e-4, 5e-5))},
-    True: {"semi_implicit": (1.5e-4, 1e-4, 5e-5), **dict.fromkeys(("sheetbend", "xpbd", "vbd"), (1e-3, 5e-4, 2.5e-4))},
+    False: {"implicit": (1e-2, 2.5e-3, 5e-4, 1e-4), **dict.fromkeys(PEERS, (1.5e-4, 1e-4, 5e-5))},
+    True: {
+        "semi_implicit": (1.5e-4, 1e-4, 5e-5),
+        **dict.fromkeys(("implicit", "gauss_seidel", "xpbd", "vbd"), (1e-3, 5e-4, 2.5e-4)),
+    },
 }
 
 
-def distance(x: np.ndarray, y: np.ndarray) -> float:
-    return float(np.linalg.norm(x - y, axis=1).max())
+def distances(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    """The largest distance of a particle, and the median."""
+    apart = np.linalg.norm(x - y, axis=1)
+    return float(apart.max()), float(np.median(apart))
 
 
 def tables(rows: Sequence[Row]) -> Iterator[str]:
-    yield "| | substep, ms | error at the end, mm | forward, s | forward and gradient, s |"
-    yield "| --- | --- | --- | --- | --- |"
+    yield "| | substep, ms | error at the end, mm | median, mm | forward, s | forward and gradient, s |"
+    yield "| --- | --- | --- | --- | --- | --- |"
     for r in rows:
         both = "" if r.with_gradient is None else f"{r.with_gradient:.3g}"
-        yield f"| {r.program} | {1e3 * r.h:g} | {1e3 * r.error:.2g} | {r.forward:.3g} | {both} |"
+        yield f"| {r.program} | {1e3 * r.h:g} | {1e3 * r.error:.2g} | {1e3 * r.median:.2g} | {r.forward:.3g} | {both} |"
     if derived := [r for r in rows if r.gradient]:
         yield ""
         yield "| derivative with respect to | " + " | ".join(f"{r.program}, {1e3 * r.h:g} ms" for r in derived) + " |"
@@ -153,9 +166,9 @@ def tables(rows: Sequence[Row]) -> Iterator[str]:
         for name in STEPS:
             pairs = (f"{r.gradient[name]:.6g} ({r.differences[name]:.6g})" for r in derived)
             yield f"| {name} | " + " | ".join(pairs) + " |"
-    for peer in dict.fromkeys(r.program for r in rows if r.program != "sheetbend"):
+    for peer in dict.fromkeys(r.program for r in rows if not r.program.startswith("sheetbend")):
         theirs = min((r for r in rows if r.program == peer), key=lambda r: r.error)
-        good = [r for r in rows if r.program == "sheetbend" and r.error <= theirs.error]
+        good = [r for r in rows if r.program.startswith("sheetbend") and r.error <= theirs.error]
         yield ""
         if good:
             best = min(good, key=lambda r: r.forward)
@@ -169,13 +182,14 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--scenes", nargs="+", choices=["rope", "cloth"], default=["rope", "cloth"])
     parser.add_argument("--columns", type=int, default=32, help="particles along a side of the cloth")
+    parser.add_argument("--methods", nargs="+", choices=list(SOLVERS), default=list(SOLVERS), help="this package's")
     parser.add_argument("--peers", nargs="+", choices=PEERS, default=["semi_implicit"], help="solvers of newton")
     parser.add_argument("--forward", action="store_true", help="no gradients")
     given = parser.parse_args()
     for name in given.scenes:
         s = rope_on_plane() if name == "rope" else cloth_on_sphere(given.columns)
         substeps = SUBSTEPS[s.sphere > 0]
-        rows = [*ours(s, substeps["sheetbend"], given.forward)]
+        rows = [row for m in given.methods if m in substeps for row in ours(s, m, substeps[m], given.forward)]
         for peer in given.peers:
             rows += newtons(s, peer, substeps[peer], given.folder.resolve(), given.forward)
         print(f"\n{name}, {len(s.start)} particles, {s.seconds:g} s\n")

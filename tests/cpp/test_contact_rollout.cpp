@@ -148,14 +148,26 @@ struct Tumble {
   double restitution = -1.0;
   bool field = false;  // whether the sphere is given by a grid
   double dissipation = -1.0;
+  Partition partition = Partition::implicit;
+
+  SolverOptions options() const {
+    SolverOptions o = contact_options(1e-3, integrator);
+    o.partition = partition;
+    if (partition == Partition::gauss_seidel) o.iterations = 6;
+    return o;
+  }
 };
-Sample tumbling(const Tumble& t) {
+Tumble swept(Tumble t) {
+  t.partition = Partition::gauss_seidel;
+  return t;
+}
+Sample tumbling(const Tumble& t, bool joined = true) {
   ContactBuilder b;
   const double link = 0.05;
   for (int i = 0; i < 4; ++i)
     b.particle({link * i, 0.004 * i * i, 0.012 + 0.011 * i}, 0.002 + 0.0003 * i, {0.4 - 0.2 * i, 0.3, -1.0 - 0.1 * i});
-  for (int i = 0; i < 3; ++i) b.constraint("distance", {i, i + 1}, link / 50.0, {link});
-  for (int i = 0; i < 2; ++i) b.constraint("bend", {i, i + 1, i + 2}, link / 1e-4, {});
+  for (int i = 0; joined && i < 3; ++i) b.constraint("distance", {i, i + 1}, link / 50.0, {link});
+  for (int i = 0; joined && i < 2; ++i) b.constraint("bend", {i, i + 1, i + 2}, link / 1e-4, {});
   b.collider("plane", {}, {0.0, 0.0, 0.0, 0.02, -0.05, 0.3});
   b.collider(t.field ? "distance_field" : "sphere", t.field ? std::vector<double>{} : std::vector<double>{0.05},
              {0.02, 0.02, -0.04, 0.1, 0.2, 0.0, 0.02, 0.02, -0.03, 0.4, 1.2, -0.5}, {0.0, 0.06});
@@ -214,7 +226,7 @@ class Tumbling : public ::testing::TestWithParam<Tumble> {
 
 TEST_P(Tumbling, HasTheGradientOfComplexSteps) {
   const Sample s = tumbling(GetParam());
-  const Program p{s.scene, make_plan(s.scene, contact_options(1e-3, GetParam().integrator)), steps};
+  const Program p{s.scene, make_plan(s.scene, GetParam().options()), steps};
   const Modes modes = modes_of(p, s.inputs);
   const bool bounces = GetParam().restitution >= 0.0;  // and slides for a short time only
   EXPECT_GT(modes.began, 3);
@@ -227,7 +239,7 @@ TEST_P(Tumbling, HasTheGradientOfComplexSteps) {
 
 TEST_P(Tumbling, HasTheTangentsOfComplexSteps) {
   const Sample s = tumbling(GetParam());
-  const Program p{s.scene, make_plan(s.scene, contact_options(1e-3, GetParam().integrator)), steps};
+  const Program p{s.scene, make_plan(s.scene, GetParam().options()), steps};
   const Layout& layout = s.scene.layout;
   expect_tangents_agree(p, s.inputs,
                         {layout.of(Quantity::friction) + 1, layout.of(Quantity::collider_pose) + 8,
@@ -240,7 +252,7 @@ TEST_P(Tumbling, HasTheTangentsOfComplexSteps) {
 
 TEST_P(Tumbling, HasTheSameBitsWhateverKeepsItsStates) {
   const Sample s = tumbling(GetParam());
-  const Program p{s.scene, make_plan(s.scene, contact_options(1e-3, GetParam().integrator)), steps};
+  const Program p{s.scene, make_plan(s.scene, GetParam().options()), steps};
   expect_bits_of_any_tape(p, s.inputs);
 
   // Another scene in a lane touches at other times.
@@ -252,16 +264,17 @@ TEST_P(Tumbling, HasTheSameBitsWhateverKeepsItsStates) {
     expect_bits_of_lanes(p, inputs, {3, 5}, kept);
 }
 
-INSTANTIATE_TEST_SUITE_P(Contact, Tumbling,
-                         ::testing::Values(Tumble{0.8, 0.0}, Tumble{0.4, 300.0}, Tumble{0.0, 0.0},
-                                           Tumble{0.8, 0.0, Integrator::bdf2}, Tumble{0.4, 300.0, Integrator::bdf2},
-                                           Tumble{0.4, 0.0, Integrator::bdf1, 0.6},
-                                           Tumble{0.4, 0.0, Integrator::bdf2, 0.6},
-                                           Tumble{0.8, 0.0, Integrator::bdf1, -1.0, true},
-                                           Tumble{0.4, 0.0, Integrator::bdf2, 0.6, true},
-                                           Tumble{0.4, 300.0, Integrator::bdf1, -1.0, false, 0.7},
-                                           Tumble{0.4, 300.0, Integrator::bdf2, -1.0, true, 0.7},
-                                           Tumble{0.0, 300.0, Integrator::bdf1, -1.0, false, 0.7}));
+INSTANTIATE_TEST_SUITE_P(
+    Contact, Tumbling,
+    ::testing::Values(Tumble{0.8, 0.0}, Tumble{0.4, 300.0}, Tumble{0.0, 0.0}, Tumble{0.8, 0.0, Integrator::bdf2},
+                      Tumble{0.4, 300.0, Integrator::bdf2}, Tumble{0.4, 0.0, Integrator::bdf1, 0.6},
+                      Tumble{0.4, 0.0, Integrator::bdf2, 0.6}, Tumble{0.8, 0.0, Integrator::bdf1, -1.0, true},
+                      Tumble{0.4, 0.0, Integrator::bdf2, 0.6, true},
+                      Tumble{0.4, 300.0, Integrator::bdf1, -1.0, false, 0.7},
+                      Tumble{0.4, 300.0, Integrator::bdf2, -1.0, true, 0.7},
+                      Tumble{0.0, 300.0, Integrator::bdf1, -1.0, false, 0.7}, swept({0.8, 0.0}),
+                      swept({0.4, 300.0, Integrator::bdf2}), swept({0.4, 0.0, Integrator::bdf2, 0.6, true}),
+                      swept({0.4, 300.0, Integrator::bdf1, -1.0, false, 0.7})));
 
 // Restarting from a state in between gives the same bits, also in the middle of an impact.
 TEST(Contact, GoesOnFromAnyState) {
@@ -386,10 +399,33 @@ TEST(Contact, LeapsOverKinksWithoutComingBack) {
 
 TEST(Contact, IsRefusedWhereItIsNotMade) {
   const Sample s = tumbling({0.4, 0.0});
-  for (const Partition other : {Partition::gauss_seidel, Partition::direct, Partition::newton, Partition::newton_cg}) {
-    SolverOptions options = contact_options(1e-3);
+  SolverOptions options = contact_options(1e-3);
+  for (const Partition other : {Partition::direct, Partition::newton, Partition::newton_cg}) {
     options.partition = other;
     EXPECT_THROW(make_plan(s.scene, options), std::invalid_argument);
+  }
+  options.partition = Partition::gauss_seidel;
+  ContactBuilder b;
+  const Vec3<double> none(0.0, 0.0, 0.0);
+  b.body(0.1, {1e-4, 1e-4, 1e-4}, {0.0, 0.0, 0.1}, none, none, none);
+  b.collider("plane", {}, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0});
+  b.contact_of(0, {{0.01, 0.0, 0.0}}, 0.3, 0.0);
+  EXPECT_THROW(make_plan(b.build(g).scene, options), std::invalid_argument);
+}
+
+// Sweeps project the law that implicit substeps balance. What constraints join differs, since each sweep pushes along the gradient that it meets.
+TEST(Contact, OfManySweepsIsThatOfImplicitSubsteps) {
+  for (const Tumble& t : {Tumble{0.8, 0.0}, Tumble{0.4, 300.0, Integrator::bdf2}}) {
+    const Sample s = tumbling(t, false);
+    SolverOptions sweeps = swept(t).options();
+    sweeps.iterations = 100;
+    constexpr int steps = 40;
+    const Program implicit{s.scene, make_plan(s.scene, t.options()), steps};
+    const Program many{s.scene, make_plan(s.scene, sweeps), steps};
+    EXPECT_GT(modes_of(many, s.inputs).slid, 10);
+    const auto expected = states(implicit, s.inputs), found = states(many, s.inputs);
+    for (std::size_t d = 0; d < 12; ++d)
+      EXPECT_NEAR(found[steps * s.scene.dofs() + d], expected[steps * s.scene.dofs() + d], 1e-9);
   }
 }
 

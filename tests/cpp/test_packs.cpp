@@ -78,11 +78,8 @@ struct Packs : ::testing::TestWithParam<Scenes> {
     begin_sweeps_vjp(scene, plan.packs, threads, in, f.state, in_bar, bar);
     const int last = plan.options.iterations - 1;
     for (int i = last; i >= 0; --i) sweep_vjp(plan.packs, kernels, threads, 1, i, i == last, f.state, bar);
-    end_sweeps_vjp(scene, plan.packs, bar, C_r_bar);
-    for (int n = 0; n < scene.nodes(); ++n) {
-      Vec3<double>(bar.rows.at(n)).store(&all[scene.first_dof[n]]);
-      w_bar[n] = bar.rows.at(n)[3];
-    }
+    end_sweeps_vjp(scene, plan.packs, threads, bar, w_bar, C_r_bar);
+    for (int n = 0; n < scene.nodes(); ++n) Vec3<double>(bar.rows.at(n)).store(&all[scene.first_dof[n]]);
     finish(scene, plan.packs, in, in_bar, bar);
     return all;
   }

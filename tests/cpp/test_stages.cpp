@@ -43,7 +43,7 @@ struct ReverseOf<PushAlongX> {
       if (!step.scene.inertial[n]) continue;
       const T along = eta * eta * *bar.q.of(n);
       *bar.in.beyond() += work.masses.w[n] * along;
-      bar.w.of(n) += *step.in.beyond() * along;
+      bar.w[n] += *step.in.beyond() * along;
     }
   }
 };
@@ -119,7 +119,7 @@ struct ReverseOf<HoldInLayer> {
       const auto q_bar = source.read(Vec3<T>(bar.q.of(pair.particle)));
       const Single<T> along = dot(source.at(step.from.x, pair.carried), q_bar);
       source.add(-(eta2 * w * along), bar.in.beyond()[1]);
-      source.add(-(eta2 * k * along), bar.w.of(pair.particle));
+      source.add(-(eta2 * k * along), bar.w[pair.particle]);
       source.add(-(eta2 * w * k) * q_bar, bar.from.x + step.scene.first_dof[pair.carried]);
     }
   }

@@ -151,9 +151,9 @@ def test_shapes_refuse_what_they_cannot_be():
         scene.contact([0], sb.Plane(name="table"), friction=0.1)
 
 
-@pytest.mark.parametrize("method", ["direct", "newton", "newton_cg", "gauss_seidel"])
-def test_other_methods_name_the_one_that_can(method):
-    with pytest.raises(sb.InputError, match="implicit"):
+@pytest.mark.parametrize("method", ["direct", "newton", "newton_cg"])
+def test_other_methods_name_those_that_can(method):
+    with pytest.raises(sb.InputError, match="use implicit, or gauss_seidel"):
         sb.simulate(rope_above(), TIMES, sb.Solver(h=1e-3, method=method, integrator="bdf1"))
 
 

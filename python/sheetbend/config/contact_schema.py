@@ -104,8 +104,9 @@ class ColliderSection(Section):
 
 class ContactSection(Section):
     """Who may touch a collider, and how rough that is, `Scene.contact` (docs/contact.md). A list: [[scene.contact]].
-    It needs method = "implicit" in [solver]. Its quantities are <name>_friction, unless zero <name>_contact_radius (m),
-    and where given <name>_contact_stiffness (N/m), <name>_contact_dissipation (s/m) and <name>_restitution."""
+    It needs method = "implicit" or "gauss_seidel" in [solver]. Its quantities are <name>_friction, unless zero
+    <name>_contact_radius (m), and where given <name>_contact_stiffness (N/m), <name>_contact_dissipation (s/m) and
+    <name>_restitution."""
 
     name: Name | None = key(None, "prefix of its quantities; the collider's name when left out")
     of: Name | list[Name] = key(

@@ -30,9 +30,12 @@ def check_solver(section: SceneSection, solver: SolverSection) -> None:
         ConfigError: another method, with the line that [solver] needs.
     """
     method = solver.model_dump()["method"]
-    if (section.contact or section.self_contact) and method != "implicit":
-        problem = f"does not know {'[[scene.contact]]' if section.contact else '[scene.self_contact]'}"
-        raise ConfigError("solver.method", problem, method, 'write method = "implicit" in [solver]')
+    if section.contact and method not in ("implicit", "gauss_seidel"):
+        fix = 'write method = "implicit" in [solver], or "gauss_seidel" for cloth in many short substeps'
+        raise ConfigError("solver.method", "does not know [[scene.contact]]", method, fix)
+    if section.self_contact and method != "implicit":
+        fix = 'write method = "implicit" in [solver]'
+        raise ConfigError("solver.method", "does not know [scene.self_contact]", method, fix)
 
 
 def add_contacts(

@@ -321,8 +321,9 @@ class Scene(SelfTouchingScene):
         """Let particles (no links or triangles) touch a shape, and return the contact's name; see docs/contact.md.
 
         Particles are pushed out along the normal and held by Coulomb friction; links and triangles between them are
-        not. Needs method "implicit". Its numbers are the quantities in brackets, and so are those of the collider:
-        `<collider>_x`, `_y` and `_z`, m from where it was given, and its lengths, such as `<collider>_radius` m.
+        not. Needs method "implicit" or, for particles, "gauss_seidel". Its numbers are the quantities in brackets, and
+        so are those of the collider: `<collider>_x`, `_y` and `_z`, m from where it was given, and its lengths, such as
+        `<collider>_radius` m.
 
         Args:
             what: a rope, a rod, a cloth, particles (n,), or a body.

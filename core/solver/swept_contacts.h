@@ -1,0 +1,127 @@
+// Contacts of particles that go by sweeps. After each pass over the constraints every contact is projected: what the constraints and other contacts have
+// made of its particle, its own force of the pass before taken off, is y; the particle goes to x = y + w F(x) (core/contact/balanced.h). F is
+// the force of the whole substep and no increment, so that Coulomb's limit is that of the whole push, and what a contact pushed too far in an early pass
+// it takes back later. One thread works, in the order of contacts, so bits do not depend on their number.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/contact/balanced.h"
+#include "core/solver/contact_source.h"
+#include "core/solver/implicit_block.h"
+#include "core/solver/plan.h"
+
+namespace sheetbend {
+
+// The contacts of one scene of a T.
+template <class S>
+struct SweptContacts {
+  // Where a particle is after its projection, and the force in multipliers; in the world's frame. None where it does not push.
+  struct Push {
+    Vec3<S> x, force;
+    bool pushes = false;
+  };
+  ColliderPoses<S> poses;
+  std::vector<ContactNumbers<S>> numbers;  // per contact of the plan; of those that have not come near, radius and size
+  std::vector<char> near;    // likewise: whether any pass found it below the surface, or restitution may lift it
+  std::vector<Push> pushes;  // contact after contact, of all passes or the last one
+
+  void resize(const Plan& plan, int kept_iterations) {
+    numbers.resize(plan.contacts.size());
+    near.resize(plan.contacts.size());
+    pushes.resize(std::max(1, kept_iterations) * plan.contacts.size());
+  }
+  static std::size_t bytes(const Scene& scene, const Plan& plan, int kept_iterations) {
+    return 3 * sizeof(Pose<S>) * scene.colliders.size() +
+           (sizeof(ContactNumbers<S>) + sizeof(char) + std::max(1, kept_iterations) * sizeof(Push)) *
+               plan.contacts.size();
+  }
+  Push& push(int iteration, int i) {
+    return pushes[pushes.size() == numbers.size() ? i : iteration * numbers.size() + i];
+  }
+  // What contact i did in the pass before; of one record, as it stands there.
+  const Push& before(int iteration, int i) {
+    static const Push none;
+    return iteration == 0 ? none : push(iteration - 1, i);
+  }
+
+  // What a substep begins with. Where nothing touches, all that is asked for is gaps.
+  template <class T>
+  void begin(const ContactSource<T>& source, const Plan& plan) {
+    poses = source.poses();
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      const SweptContact& c = plan.contacts[i];
+      near[i] = source.scene.contacts[c.contact].rebounds(c.item);
+      if (near[i]) {
+        numbers[i] = source.numbers(poses, c.contact, c.item);
+        continue;
+      }
+      numbers[i].radius = source.read(source.in.of(Quantity::contact_radius)[c.contact]);
+      source.read_size(source.scene.colliders[c.collider], numbers[i].size);
+    }
+  }
+  // Whether contact i is to be looked at with its particle at y, all its numbers then at hand.
+  template <class T>
+  bool comes_near(const ContactSource<T>& source, const SweptContact& c, int i, const Vec3<S>& y) {
+    if (near[i]) return true;
+    S at[3], n[3], distance;
+    poses.next[c.collider].in_frame(y).store(at);
+    distance_from(c.shape, at, numbers[i].size, distance, n);
+    if (!(value_of(distance - numbers[i].radius) < 0.0)) return false;
+    numbers[i] = source.numbers(poses, c.contact, c.item);
+    near[i] = true;
+    return true;
+  }
+};
+
+// x = y + w F(x) of one contact, all in the world's frame; `found` says whether such an x is.
+template <class S>
+typename SweptContacts<S>::Push push_out(const AnyShape& shape, const Pose<S>& pose, const Vec3<S>& y, const S& w,
+                                         const ContactNumbers<S>& numbers, bool& found) {
+  constexpr bool plain = std::is_same_v<S, double>;
+  const Vec3<S> own = pose.in_frame(y);
+  Balanced at;
+  if constexpr (plain)
+    at = balanced(shape, own, w, numbers);
+  else
+    at = balanced(shape, values_of(own), value_of(w), values_of(numbers));
+  found = at.found;
+  if (!at.pushes) return {y, {}, false};
+  Vec3<S> z(S(at.z.x), S(at.z.y), S(at.z.z));
+  if constexpr (!plain) z = balanced_near(shape, at.z, own, w, numbers);
+  const Vec3<S> moved = pose.turned(z - own);
+  return {y + moved, (S(1.0) / w) * moved, true};
+}
+
+// One pass over all contacts of a scene of T. at(node, d) is where a coordinate stands; the first pass (0) starts from no forces. Throws Unbalanced.
+template <class T, class At>
+void project_contacts(const ContactSource<T>& source, const Plan& plan, int iteration, At&& at,
+                      SweptContacts<Single<T>>& contacts) {
+  using S = Single<T>;
+  for (int i = 0; i < static_cast<int>(plan.contacts.size()); ++i) {
+    const SweptContact& c = plan.contacts[i];
+    T q[3] = {T(at(c.node, 0)), T(at(c.node, 1)), T(at(c.node, 2))};
+    Vec3<S> y = source.read(Vec3<T>(q));
+    const auto& before = contacts.before(iteration, i);
+    const bool pushed = before.pushes;
+    if (pushed) y = y - source.read(source.w[c.node]) * before.force;
+    auto& push = contacts.push(iteration, i);
+    if (!contacts.comes_near(source, c, i, y)) {
+      push.pushes = false;
+      continue;
+    }
+    bool found;
+    push = push_out(c.shape, contacts.poses.next[c.collider], y, source.read(source.w[c.node]), contacts.numbers[i],
+                    found);
+    if (!found)
+      throw Unbalanced("particle " + std::to_string(c.node) + " finds no place on the surface of " +
+                           source.scene.contacts[c.contact].name,
+                       "use smaller substeps", 0, 0.0, c.node);
+    if (!pushed && !push.pushes) continue;
+    source.write(push.x, q);
+    for (int d = 0; d < 3; ++d) at(c.node, d) = q[d];
+  }
+}
+
+}  // namespace sheetbend

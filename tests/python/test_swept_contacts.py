@@ -1,0 +1,70 @@
+"""Contacts with the method "gauss_seidel": after each sweep, particles are projected out of colliders."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from sheetbend.mesh import grid
+
+SLOPE = np.pi / 6
+
+
+def block(friction: float, slope: float = 0.0, speed: float = 0.0) -> sb.Scene:
+    """A particle on a plane that falls toward +x, at rest or thrown along it."""
+    scene = sb.Scene("block", gravity=(9.81 * np.sin(slope), 0.0, -9.81 * np.cos(slope)))
+    scene.contact(scene.add_particles([[0, 0, 0]], 0.3, [[speed, 0, 0]]), sb.Plane(name="table"), friction=friction)
+    return scene
+
+
+def swept(h: float, sweeps: int, **options: str) -> sb.Solver:
+    return sb.Solver(h=h, method="gauss_seidel", iterations=sweeps, **options)
+
+
+def test_a_block_slides_where_coulomb_says_and_does_not_creep():
+    times, solver = [0.0, 0.5], swept(1e-3, 2)
+    held = sb.simulate(block(0.578, SLOPE), times, solver).positions[-1, 0]
+    slid = sb.simulate(block(0.577, SLOPE), times, solver).positions[-1, 0]
+    assert abs(held[0]) < 1e-8 < slid[0]
+    thrown = sb.simulate(block(0.3, speed=2.0), [0.0, 0.8], swept(1e-2, 1, integrator="bdf1"))
+    assert thrown.positions[-1, 0, 0] == pytest.approx(0.669585, abs=1e-6)  # closed form of the substeps
+
+
+def falling_cloth(**options: float) -> sb.Scene:
+    """A cloth that falls onto a ball, 9 x 9 particles."""
+    scene = sb.Scene("fall")
+    mesh = grid(0.2, 0.2, 8, 8)
+    lifted = np.asarray(mesh.vertices) - [0.1, 0.1, -0.105]
+    cloth = sb.add_cloth(
+        scene, mesh, "cloth", positions=lifted, density=0.2, warp=40.0, shear=10.0, bending=1e-5, **options
+    )
+    scene.contact(cloth, sb.Sphere(center=(0, 0, 0), radius=0.1, name="ball"), friction=0.3, radius=0.001)
+    return scene
+
+
+def test_cloth_that_yields_may_touch():
+    scene = falling_cloth(yield_curvature=5.0, yield_share=0.5)
+    with pytest.raises(ValueError, match="yields or slides"):
+        sb.simulate(scene, 0.01, sb.Solver(h=1e-3, method="implicit"))
+    motion = sb.simulate(scene, [0.0, 0.1], swept(1e-3, 10))
+    away = np.linalg.norm(motion.positions[-1], axis=1)
+    assert away.min() > 0.101 - 1e-5
+    assert motion.contacts["ball"].deepest < 1e-5
+    assert np.ptp(motion.positions[-1, :, 2]) > 0.03  # the corners hang down
+
+
+def test_gradients_of_cloth_on_a_ball_hold_against_independent_ones():
+    report = sb.check_gradients(falling_cloth(), 0.03, swept(1e-3, 6))
+    assert report.passed, str(report)
+
+
+def test_bodies_and_pairs_are_sent_to_implicit():
+    scene = sb.Scene("box")
+    body = scene.add_body(mass=0.1, inertia=(1e-4,) * 3, at=(0, 0, 0.1), name="box")
+    scene.contact(body, sb.Plane(name="table"), friction=0.3, points=[(0, 0, -0.05)])
+    with pytest.raises(ValueError, match=r"points of bodies in table.*use implicit"):
+        sb.simulate(scene, 0.01, swept(1e-3, 2))
+    rope = sb.rope(0.5, 20, density=0.05, EA=100.0, start=(0, 0, 0))
+    rope.self_contact(rope.ropes["rope"], radius=0.004)
+    with pytest.raises(ValueError, match=r"touch each other.*use implicit"):
+        sb.simulate(rope, 0.01, swept(1e-3, 2))
