@@ -1,7 +1,7 @@
 """sheetbend: a differentiable XPBD simulator for parameter identification.
 
-Ropes and cloth with exact gradients in double precision: simulate, differentiate, and fit physical parameters
-to recordings, with intervals and words for what the data cannot tell.
+Ropes, rods, cloth, solids and rigid bodies with exact gradients in double precision: simulate, differentiate, and fit
+physical parameters to recordings, with an interval and a verdict for each.
 """
 
 from typing import TYPE_CHECKING, Any
