@@ -23,7 +23,7 @@ def compare_sections(fits: Sequence[Written], pairs: Mapping[str, Paired | None]
 
 
 def compare_dict(fits: Sequence[Written], pairs: Mapping[str, Paired | None]) -> dict[str, Any]:
-    """The same for JSON."""
+    """The comparison as values for JSON."""
     return {
         "first": fits[0].name,
         "others": {

@@ -76,7 +76,7 @@ class Growth:
         return None if len(above) == 0 else float(self.times[max(above[0] - 1, 0)])
 
     def to_dict(self) -> dict[str, float | None]:
-        """For JSON: largest (None where it overflows), rate, until."""
+        """Values for JSON: `largest` (None where it overflows), `rate` and `until`."""
         return {
             "largest": self.largest if np.isfinite(self.largest) else None,
             "rate": self.rate,

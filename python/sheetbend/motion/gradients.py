@@ -214,7 +214,7 @@ class _Checked:
 
 
 def _row(name: str, size: int, entries: Sequence[_Entry]) -> GradientRow:
-    """Of tested entries, relative to the largest."""
+    """The row of the report for some tested entries, with errors relative to the largest."""
     columns = np.array([(e.gradient, e.exact, e.rough, e.error, e.faint, e.rounding) for e in entries]).T
     gradient, exact, rough, error, faint, rounding = columns
     unfelt = bool((np.maximum(np.abs(gradient), np.abs(exact)) <= faint).all())

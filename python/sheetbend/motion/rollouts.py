@@ -89,7 +89,7 @@ class Rollouts:
         return out
 
     def _lengths_of(self, inputs: Array) -> list[int]:
-        """Of the batch's scenes; empty where all have every frame."""
+        """Numbers of frames of the batch's scenes; empty where all scenes have every frame."""
         if self._lengths is None:
             return []
         if len(self._lengths) != len(inputs):

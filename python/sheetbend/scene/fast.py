@@ -29,7 +29,7 @@ class Fastest:
 
 
 def fastest(contacts: Contacts, radii: np.ndarray) -> tuple[Fastest, ...]:
-    """Of every collider that moves and can pass through particles, which a half space cannot.
+    """The largest speed of every collider that moves and can pass through particles, which a half space cannot.
 
     Args:
         radii: (contacts,) m.
