@@ -13,8 +13,8 @@ from .. import _core
 from ..errors import SceneError, choices, refusal
 from ..quantities.quantities import FUNCTIONS, Term
 from . import pieces
+from .collider_speeds import Fastest, fastest
 from .domain import Domain
-from .fast import Fastest, fastest
 from .kinks import kinks
 from .scene_data import SceneData
 from .settle import SettledStart, settled
