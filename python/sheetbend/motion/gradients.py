@@ -20,9 +20,9 @@ from ..errors import InputError
 from ..scene.compiled import CompiledScene
 from ..scene.domain import NOT_NEGATIVE, POSITIVE
 from ..scene.scene import Scene
+from .core_terms import divergence, substeps
 from .gradient_probe import DIFFERENCES_BOUND, JITTERS, LOUD, Probe, jittered
 from .gradient_report import COMPLEX_STEP_BOUND, GradientReport, GradientRow
-from .simulate import divergence, substeps
 from .solver import Solver
 from .tape import budget
 

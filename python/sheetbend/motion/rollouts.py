@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..scene.scene import Scene
-from .simulate import divergence
+from .core_terms import divergence
 from .solver import Solver
 from .tape import budget
 

@@ -11,8 +11,8 @@ from torch import Tensor
 
 from .. import _core
 from ..errors import SceneError, refusal
+from ..motion.core_terms import forces_by_group, pressures_by_volume
 from ..motion.equilibrium import NoEquilibriumError, whole_start
-from ..motion.simulate import forces_by_group, pressures_by_volume
 from ..scene.scene import Scene
 from .function import respond
 from .inputs import InputMap

@@ -11,8 +11,8 @@ from torch import Tensor
 
 from .. import _core
 from ..errors import InputError
+from ..motion.core_terms import divergence
 from ..motion.rollouts import Rollouts
-from ..motion.simulate import divergence
 from ..motion.solver import Solver
 from ..scene.scene import Scene
 from .function import respond
