@@ -19,9 +19,10 @@ import numpy as np
 
 from .. import _core
 from ..arrays.timeseries import Array
+from ..errors import NoEquilibriumError
 from ..experiment.cut import shot, start_quantities
 from ..experiment.experiment import Experiment
-from ..motion.equilibrium import NoEquilibriumError, equilibrium
+from ..motion.equilibrium import equilibrium
 from ..motion.solver import Solver
 from ..scene.scene import Scene
 from .lifted import Lifted

@@ -9,9 +9,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..arrays.timeseries import Array
-from ..errors import InputError
+from ..errors import InputError, NoEquilibriumError
 from ..minimum.linear_algebra import one_blas_thread
-from ..motion.equilibrium import NoEquilibriumError
 from ..objects.fabric import Fabric
 from ..objects.laws import Spline, Stiffening
 from ..optional import require
