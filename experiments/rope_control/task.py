@@ -11,8 +11,8 @@ import numpy as np
 import sheetbend as sb
 from motion import Array, Control
 from scipy.sparse import csr_array
+from sheetbend.motion.core_terms import substeps
 from sheetbend.motion.rollouts import Rollouts
-from sheetbend.motion.simulate import substeps
 
 
 class Outcome(NamedTuple):

@@ -1,7 +1,7 @@
 """sheetbend: a differentiable XPBD simulator for parameter identification.
 
-Ropes and cloth with exact gradients in double precision: simulate, differentiate, and fit physical parameters
-to recordings, with intervals and words for what the data cannot tell.
+Ropes, rods, cloth, solids and rigid bodies with exact gradients in double precision: simulate, differentiate, and fit
+physical parameters to recordings, with an interval and a verdict for each.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,7 @@ from .errors import (
     EmptyGradientError,
     InputError,
     MeshError,
+    NoEquilibriumError,
     RecordingError,
     SceneError,
     SheetbendError,
@@ -32,7 +33,7 @@ from .minimum.discretization import Refinement
 from .minimum.smooth import Smooth
 from .motion.balance import ForceBalance, force_balance
 from .motion.contact_counts import ContactCounts, ContactMode
-from .motion.equilibrium import Equilibrium, NoEquilibriumError, equilibria, equilibrium
+from .motion.equilibrium import Equilibrium, equilibria, equilibrium
 from .motion.gradient_report import GradientReport
 from .motion.gradients import check_gradients
 from .motion.redundancy import RedundantConstraintsWarning

@@ -159,6 +159,10 @@ class UnbalancedError(SheetbendError, RuntimeError):
         return f"{self.problem}, {when}. Fix: {self.fix}."
 
 
+class NoEquilibriumError(SheetbendError, RuntimeError):
+    """The solver did not reach an equilibrium from the given start; the message says why, and what to try."""
+
+
 class EmptyGradientError(SheetbendError, RuntimeError):
     """A loss does not depend on the quantities that an optimizer would change: its gradient is zero or rounding errors.
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from oracles import integration
 from scipy.optimize import brentq
 from sheetbend import _core
-from sheetbend.motion.simulate import substeps
+from sheetbend.motion.core_terms import substeps
 
 Array = np.ndarray
 Direction = str | Mapping[str, ArrayLike]

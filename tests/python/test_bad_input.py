@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import sheetbend as sb
 import sheetbend.torch as st
-from sheetbend.motion.equilibrium import NoEquilibriumError
+from sheetbend.errors import NoEquilibriumError
 from sheetbend.quantities.quantities import term
 
 NAN, INF = math.nan, math.inf

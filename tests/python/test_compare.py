@@ -11,7 +11,7 @@ import pytest
 import sheetbend as sb
 from pytest import approx
 from sheetbend.cli.app import app
-from sheetbend.cli.compared import HeldOut, in_common
+from sheetbend.cli.written_fits import HeldOut, in_common
 from sheetbend.statistics.paired import paired
 from typer.testing import CliRunner, Result
 

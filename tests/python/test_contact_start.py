@@ -59,13 +59,14 @@ def test_a_measured_start_below_the_table_is_fitted_and_the_report_tells() -> No
     assert "settle moved 2 particles out of table, by up to 1 mm" in " ".join(result.report().split())
 
 
-def swept(h: float, radius: float = 0.01, interpolation: str = "linear") -> sb.Scene:
-    scene = sb.Scene("swept")
+def swept(h: float, radius: float = 0.01, interpolation: str = "linear") -> sb.Trajectory:
+    """A post that moves at 4 m/s toward a particle 0.2 m away, and is past its place at the end."""
+    scene = sb.Scene("swept", gravity=(0.0, 0.0, 0.0))
     (particle,) = scene.add_particles([[0.0, 0.0, 0.2]], 0.1)
     post = sb.Capsule(start=(-0.2, -1, 0.2), end=(-0.2, 1, 0.2), radius=radius, name="post")
     moving = post.moving([0.0, 0.1], [[0, 0, 0], [0.4, 0, 0]], interpolation=interpolation)
     scene.contact([particle], moving, friction=0.1, radius=0.002)
-    return sb.simulate(scene, [0.0, 0.04], sb.Solver(h=h, method="implicit", integrator="bdf1"))
+    return sb.simulate(scene, [0.0, 0.06], sb.Solver(h=h, method="implicit", integrator="bdf1"))
 
 
 @pytest.mark.parametrize(("h", "interpolation"), [(4e-3, "linear"), (2.5e-3, "cubic")])
@@ -74,9 +75,10 @@ def test_a_collider_that_would_jump_over_particles_is_refused(h: float, interpol
         swept(h, interpolation=interpolation)
 
 
-def test_a_collider_that_is_seen_pushes() -> None:
-    swept(2.5e-3)
-    swept(4e-3, radius=0.02)
+@pytest.mark.parametrize(("h", "radius"), [(2.5e-3, 0.01), (4e-3, 0.02)])
+def test_a_collider_that_is_thicker_than_its_way_in_a_substep_pushes(h: float, radius: float) -> None:
+    found = swept(h, radius).positions[-1, 0]
+    assert np.abs(found - [0.04 + radius + 0.002, 0.0, 0.2]).max() < 1e-4
 
 
 def test_a_gradient_is_empty_while_nothing_touches_and_says_so() -> None:

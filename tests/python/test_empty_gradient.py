@@ -56,7 +56,10 @@ def test_what_has_arrived_passes():
 
 def test_one_that_is_felt_is_enough():
     """The tip hangs by the rope's length."""
-    tip_at(0.1).require(SCALE | {"rope_length": 0.1})
+    gradient = tip_at(0.1)
+    refused(gradient)
+    gradient.require(SCALE | {"rope_length": 0.1})
+    assert abs(gradient.quantities["rope_length"]) > 0.1
 
 
 def test_motion_after_the_last_frame_is_refused():

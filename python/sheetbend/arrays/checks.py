@@ -71,7 +71,7 @@ def indices(field: str, values: ArrayLike, count: int) -> list[int]:
 
 
 def index_array(field: str, values: ArrayLike, count: int) -> np.ndarray:
-    """The same as one array."""
+    """`indices` as one array."""
     return node_array(field, values, count, hidden=count) % count
 
 

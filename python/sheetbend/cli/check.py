@@ -94,7 +94,8 @@ def _reports(study: Study) -> Iterator[tuple[str, GradientReport | JacobianRepor
 
 
 def _of_ropes(config: GrippedConfig, folder: Path) -> Iterator[tuple[str, GradientReport | JacobianReport]]:
-    """Of each rope its first recording, with all that its rungs may add to the model, at the first start."""
+    """The gradient report of each rope: on its first recording, with all that its rungs may add to the model, at the
+    first start."""
     ropes = load_ropes(config, folder)
     for rope in ropes:
         e, parameters = _started(rope)
@@ -130,8 +131,9 @@ def _stretch(solver: Solver) -> np.ndarray:
 
 
 def _jacobian(study: Study, e: Experiment) -> JacobianReport | None:
-    """Of one recording, its first frames, its driven markers taken for the truth: with corrections the Jacobian is no
-    derivative of the residuals, only its gradient is. None where nothing free acts on it."""
+    """The report of one recording's Jacobian on its first frames; None where nothing free acts on it. Its driven
+    markers are taken for the truth: with corrections the Jacobian is no derivative of the residuals, only its gradient
+    is."""
     mine = {name: fields for name, fields in study.parameters.items() if name in e.scene.quantities}
     if not any(not fields.get("fixed") and "tied_to" not in fields for fields in mine.values()):
         return None

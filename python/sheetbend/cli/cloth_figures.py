@@ -21,8 +21,9 @@ _STRAIN = "strain [%]"
 
 
 def cloth_figures(found: Fit, c: Comparison) -> dict[str, Axes]:
-    """By name of the cloth the first panel of its figure: its shape with the measured markers, its strains, and the
-    residual of each marker. A cloth that no flat chart covers, such as a tube, is drawn where it is in space.
+    """The first panel of each cloth's figure, by name of the cloth. The figure shows the cloth with the measured
+    markers, its strains, and the residual of each marker. A cloth that no flat chart covers, such as a tube, is drawn
+    in space.
 
     A motion is shown where the markers are farthest from their start, in the fitted part.
     """

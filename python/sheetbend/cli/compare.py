@@ -18,10 +18,10 @@ from ..pictures.drawing import ACCENT, GRAY, INK, WARM, clean, key, panels_in
 from ..report.tables import plain_section
 from ..statistics.paired import Paired, paired
 from .compare_report import compare_dict, compare_sections
-from .compared import Written, in_common, read_written
 from .folders import made
 from .outcome import Json, Outcome, run
 from .targets import check_targets
+from .written_fits import Written, in_common, read_written
 
 FILES = ("compare.txt", "compare.png")
 _TONES = (GRAY, ACCENT, WARM, INK)

@@ -11,7 +11,7 @@ from ..quantities.wording import figures, short
 from ..report.tables import Section
 from ..result.estimate import Estimate
 from ..statistics.paired import FEWEST, Paired
-from .compared import Written
+from .written_fits import Written
 
 _LONGEST = 40  # characters of a setting
 _APART = 2.0  # standard deviations
@@ -23,7 +23,7 @@ def compare_sections(fits: Sequence[Written], pairs: Mapping[str, Paired | None]
 
 
 def compare_dict(fits: Sequence[Written], pairs: Mapping[str, Paired | None]) -> dict[str, Any]:
-    """The same for JSON."""
+    """The comparison as values for JSON."""
     return {
         "first": fits[0].name,
         "others": {

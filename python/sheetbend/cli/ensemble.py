@@ -107,7 +107,7 @@ def _told(single: Single, console: Console, path: Path, folder: Path, strict: bo
 
 
 def _apart(single: Single, path: Path, folder: Path, strict: bool) -> tuple[str, Code]:
-    """In a worker: what one fit prints, and its code."""
+    """Run one fit in a worker; return what it printed and its exit code."""
     console = Screen()
     console.file = io.StringIO()
     code = _told(single, console, path, folder, strict)

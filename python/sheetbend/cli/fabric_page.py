@@ -27,7 +27,7 @@ _CAPTIONS = {
 def fabric_page_of(
     study: FabricStudy, found: WholeFabric, sections: Sequence[Section], pictures: Sequence[Path], file: Path
 ) -> str:
-    """As HTML text; a drape is drawn in space."""
+    """The page of a fabric as HTML text; a drape is drawn in space."""
     motions = []
     if study.config.drape is not None:
         rest = draped_rest(study, found)

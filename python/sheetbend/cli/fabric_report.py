@@ -24,7 +24,7 @@ def fabric_sections(study: FabricStudy, found: WholeFabric) -> tuple[Section, ..
 
 
 def fabric_dict(found: WholeFabric) -> dict[str, Any]:
-    """The same in SI units, for JSON."""
+    """The fabric and its readings in SI units, as values for JSON."""
     readings = [
         {"name": m.name, "measured": m.value, "sigma": m.sigma, "fabric": r.laboratory, "unit": r.laboratory_unit}
         for m, r in zip(found.fit.measured, found.fit.readings, strict=True)

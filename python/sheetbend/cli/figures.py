@@ -130,7 +130,7 @@ def _line(found: Fit, c: Comparison) -> np.ndarray:
 
 
 def _published(found: Fit, config: Config) -> dict[str, float | tuple[float, float]]:
-    """By estimate; a private parameter's reference serves each of its estimates."""
+    """Published values by name of the estimate; the reference of a private parameter serves each of its estimates."""
     marks: dict[str, float | tuple[float, float]] = {}
     for estimate in found.result.estimates:
         value = config.published.get(estimate.name, config.published.get(estimate.name.partition("[")[0]))

@@ -199,7 +199,7 @@ def _files(study: Study) -> list[str]:
 def _kept(
     console: Console, config: Config | GrippedConfig, recordings: Sequence[Recording], place: Path, resume: bool
 ) -> Iterator[tuple[Path, Journal | None]]:
-    """Where results go, made and locked, with the journal of the fit; and the experiment's name on the screen."""
+    """Make and lock the folder of the results, open the journal of the fit in it, and print the experiment's name."""
     folder = made("--output", place)
     heading(console, config.experiment.name, config.experiment.about)
 

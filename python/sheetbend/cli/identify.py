@@ -177,7 +177,8 @@ def _planned(config: Config, folder: Path, frames: _Frames) -> list[Experiment]:
 
 
 def _with_mass(config: Config, folder: Path, frames: _Frames) -> dict[str, list[Experiment]]:
-    """The same with the rope's own weight hung on its free end, in a further motion; none where no rope has one."""
+    """The experiments with a further motion in which the rope's own weight hangs on its free end; ropes
+    without weight or a free end are left out."""
     found: dict[str, list[Experiment]] = {}
     for rope in config.scene.rope:
         mass = rope.density * (rope.length or 0.0)

@@ -93,7 +93,7 @@ def _packages() -> dict[str, str | None]:
 
 
 def _recording(console: Console, recording: Recording) -> dict[str, Any]:
-    """Its size, noise and boundary, and every marker with the place where it is first seen."""
+    """Print a recording's size, noise and boundary, and every marker with the place where it is first seen."""
     first = recording.mask.argmax(axis=0)
     at = recording.positions[first, np.arange(len(first))]
     console.print("\n" + recording.summary(), soft_wrap=True)

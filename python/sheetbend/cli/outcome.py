@@ -76,8 +76,8 @@ def run(command: Callable[[Console], Outcome], as_json: bool) -> None:
 
 
 def code_of(results: Sequence[FitResult], strictly: bool) -> Code:
-    """Of fits: whether all got to their end, converged to sound verdicts, and whether every one (strictly: every
-    parameter) is identifiable."""
+    """The exit code of fits: whether all ended by themselves, all converged to sound verdicts, and each found at least
+    one parameter that is identifiable (strictly: found all so)."""
     if any(result.interrupted for result in results):
         return Code.INTERRUPTED
     if not all(result.converged and result.sound for result in results):

@@ -11,7 +11,7 @@ import numpy as np
 from .. import _core
 from ..experiment.experiment import Experiment
 from ..minimum.problem import NOTHING
-from ..motion.simulate import divergence
+from ..motion.core_terms import divergence
 from ..recording.recording import Recording
 
 PREDICTED = "predicted_"

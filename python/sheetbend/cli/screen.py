@@ -22,11 +22,11 @@ class Screen(Console):
         super().__init__(stderr=stderr, width=width, highlight=False, markup=False, emoji=False)
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """As rich's, of the text spelled out: so that columns are as wide as what stands in them."""
+        """Render the text with control characters spelled out, so that columns are as wide as what they show."""
         return super().render_str(spelled(text), **options)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """As rich's, every segment of text spelled out."""
+        """Render as rich does, with control characters of every segment spelled out."""
         for segment in super().render(renderable, options):
             yield segment if segment.control else segment._replace(text=spelled(segment.text))
 
@@ -50,7 +50,7 @@ def spelled(text: str) -> str:
 
 
 def show(console: Console, rich: Callable[[], RenderableType], plain: Callable[[], str]) -> None:
-    """In color in a terminal; where that is narrow its lines wrap, but no column is lost."""
+    """Print in color in a terminal, otherwise plainly. In a narrow terminal lines wrap, and no column is lost."""
     if console.is_terminal:
         Screen(stderr=console.stderr, width=max(console.width, REPORT_WIDTH)).print(rich())
     else:

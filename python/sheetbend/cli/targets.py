@@ -50,7 +50,7 @@ def _resolved(option: str, path: Path) -> Path:
 
 
 def _identity(path: Path) -> tuple[int, int] | None:
-    """Of the file itself, whatever it is called; None where there is none."""
+    """Device and inode of a file, whatever it is called; None where there is no file."""
     try:
         found = path.stat()
     except OSError:

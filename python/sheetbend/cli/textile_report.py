@@ -24,7 +24,8 @@ _COLUMNS = {
 
 
 def kes_numbers(curve: Curve, cycle: int) -> tuple[dict[str, Reading | None], float | None]:
-    """By their names, None where the test does not tell them; and the part of the work that the loop loses."""
+    """The KES numbers of a curve by name, None where the test does not give them, and the share of the work that the
+    loop loses."""
     if curve.test == "tension":
         t = tensile_loop(curve, cycle)
         lost = None if t.resilience is None else 1.0 - t.resilience.value
@@ -66,7 +67,7 @@ def report(curves: Sequence[Curve], fit: FabricFit | None, cycle: int) -> str:
 
 
 def to_dict(curves: Sequence[Curve], fit: FabricFit | None, cycle: int) -> dict[str, Any]:
-    """The same in SI units."""
+    """The curves and the fitted fabric in SI units, as values for JSON."""
     rows: list[dict[str, Any]] = []
     for c in curves:
         told, lost = kes_numbers(c, cycle)

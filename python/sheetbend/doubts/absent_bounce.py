@@ -33,7 +33,7 @@ def with_bounce(problem: FitProblem, restitution: float) -> FitProblem:
 
 
 def with_free_bounce(problem: FitProblem) -> FitProblem:
-    """The same, with the restitution as one more parameter, the last one."""
+    """The same problem with one more parameter at the end, the restitution."""
     return with_parameter(with_bounce(problem, 0.5), RESTITUTION)
 
 

@@ -47,13 +47,13 @@ def with_damping(problem: FitProblem, u: Array, frames: float, only: str = "") -
 
 
 def with_free_damping(problem: FitProblem, u: Array, only: str) -> FitProblem:
-    """The same, with the frame intervals as one more parameter, the last one."""
+    """The same problem with one more parameter at the end, the damping as a number of frame intervals."""
     return with_parameter(with_damping(problem, u, 1.0, only), DAMPING)
 
 
 def _damped(e: Experiment, theta: Array, interval: float, frames: float, only: str) -> Experiment:
-    """With Kelvin-Voigt damping in its undamped groups, of so many intervals [s] between frames: the force per rate is
-    that time over the compliance."""
+    """The experiment with Kelvin-Voigt damping in its undamped groups. The time constant is `frames` intervals [s]
+    between frames; the force per rate is this time over the compliance."""
     bare = [k for k in undamped(e.scene) if only in ("", e.scene.groups[k].name)]
     at, _ = e.scene.compiled.layout["compliance"]
     compliance = e.scene.compiled.inputs(theta)[at:]

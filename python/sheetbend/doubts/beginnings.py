@@ -156,7 +156,7 @@ def beginnings(problem: FitProblem, end: Minimum, growths: Sequence[Growth]) -> 
 def of_beginnings(
     problem: FitProblem, u: Array, judged: Identifiability, found: Sequence[Beginning], refinement: Refinement
 ) -> dict[str, str]:
-    """By parameter, the beginning that asks for another value than the whole.
+    """By parameter, which beginning asks for another value than the whole.
 
     All parameters together must differ by more than chance explains at the 1 % level, for all beginnings together.
     Those are named that differ by 3 % or more, by more than the 95 % interval of the difference, and by more than the
@@ -209,8 +209,8 @@ def _enough(part: FitProblem, length: float) -> bool:
 
 
 def _differences(end: Whole, b: Beginning, level: float) -> Mapping[int, tuple[float, float]]:
-    """By column, how far the beginning's minimum is from that of the whole, and the 95 % reach of the difference, where
-    it is clearly farther; none at all where chance explains the differences of all columns together."""
+    """By column, the distance of the beginning's minimum from that of the whole, and the 95 % reach of this distance;
+    only columns that are clearly farther. Empty where chance explains the differences of all columns together."""
     parameters, u = b.problem.parameters, end.u
     names = list(parameters.free)
     log = [parameters[name].log for name in names]
@@ -239,7 +239,7 @@ def _differences(end: Whole, b: Beginning, level: float) -> Mapping[int, tuple[f
 
 
 def _size(problem: FitProblem, u: Array, column: int) -> float:
-    """Of a parameter, internal."""
+    """Size of a parameter in internal coordinates."""
     p = problem.parameters[problem.parameters.free[column]]
     return 1.0 if p.log else p.scale or abs(float(u[column]))
 

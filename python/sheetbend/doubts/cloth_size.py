@@ -124,7 +124,7 @@ def _differences(scene: Scene, cloth: Cloth, ends: list[Scene], values: Mapping[
 
 
 def _firsts(scene: Scene) -> dict[str, tuple[int, int]]:
-    """Of each group, where its constraints start, and where their parameters do."""
+    """By name of a group, its first constraint and the first of the parameters inside its constraints."""
     found, constraints, values = {}, 0, 0
     for g in scene.groups:
         found[g.name] = constraints, values

@@ -57,7 +57,7 @@ def doubtful(
 
 
 def together(*doubts: Mapping[str, str]) -> dict[str, str]:
-    """By parameter, all that speaks against it, the first doubt first."""
+    """By parameter, all sentences that speak against it, in the order of the doubts."""
     words: dict[str, list[str]] = {}
     for each in doubts:
         for name, why in each.items():
@@ -68,7 +68,7 @@ def together(*doubts: Mapping[str, str]) -> dict[str, str]:
 def between_parts(
     problem: FitProblem, u: Array, judged: Identifiability, refinement: Refinement | None = None
 ) -> dict[str, str]:
-    """By parameter, that separate parts of the data (time, markers, recordings) ask for different values.
+    """By parameter, why separate parts of the data (time, markers, recordings) ask for different values.
 
     All parameters together must differ between the parts by more than chance explains at the 1 % level. Those are named
     of which a part differs from the others by more than its 95 % interval, and from the estimate by more than the
@@ -301,7 +301,8 @@ def _along(positions: Array) -> Array:
 
 
 def elsewhere(problem: FitProblem, judged: Identifiability, cost: float, others: Sequence[Elsewhere]) -> dict[str, str]:
-    """By parameter, where another search ended lower, or as low as chance allows, far from the estimate."""
+    """By parameter, where another search ended that is far from the estimate, at a cost that is lower or as low as
+    chance allows."""
     rows = problem.core.data_rows
     chance = 4 * cost / max(rows - len(problem.parameters.free), 1) * judged.autocorrelation_time
     found: dict[str, str] = {}
@@ -326,7 +327,7 @@ def _outside(e: Estimate, value: float) -> bool:
 def held_out_motion(
     problem: FitProblem, comparisons: Sequence[Comparison], rows: Sequence[RecordingFit]
 ) -> dict[str, str]:
-    """By parameter, the recording of which held-out motion is predicted worse than by "it does not move"."""
+    """By parameter, the recording whose held-out motion is predicted worse than by "it does not move"."""
     found: dict[str, str] = {}
     for c, row in zip(comparisons, rows, strict=True):
         noise = c.experiment.sigma * math.sqrt(len(c.experiment.axes)) / (c.experiment.radius or 1.0)

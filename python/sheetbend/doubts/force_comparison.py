@@ -36,7 +36,7 @@ class ForceComparison:
     held_out: Array
 
     def fits(self) -> list[ForceFit]:
-        """As rows of the report: one for forces, one for torques where they are compared."""
+        """Rows of the report: one for forces, and one for torques where they are compared."""
         return [self._row(unit, part) for unit, part in UNITS if np.isfinite(self.measured[:, part]).any()]
 
     def _row(self, unit: str, part: slice) -> ForceFit:
@@ -62,7 +62,8 @@ class ForceComparison:
 
 
 def force_comparisons(problem: FitProblem, i: int, u: Array) -> tuple[ForceComparison, ...]:
-    """Of the sensors of one experiment, whose recording in the problem is the fitted and the held-out part together."""
+    """Comparisons of the sensors of one experiment, whose recording in the problem is the fitted and the held-out part
+    together."""
     e = problem.experiments[i]
     if not e.forces:
         return ()

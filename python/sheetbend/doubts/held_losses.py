@@ -33,7 +33,8 @@ def held_losses(
     known: Mapping[str, float] | None = None,
     shifts: Callable[[], list[Array]] = list,
 ) -> dict[str, str]:
-    """By free parameter, the given loss of its motion that the residuals ask another size of. One Jacobian.
+    """By free parameter, the loss that the model was given and that the residuals ask in another size. Takes one
+    Jacobian.
 
     Args:
         u: (free,) the minimum.
@@ -80,7 +81,7 @@ def of_size(problem: FitProblem, name: str, times: float) -> FitProblem:
 
 
 def _columns(problem: FitProblem, u: Array, names: Sequence[str]) -> dict[str, Array]:
-    """By name of a loss, (rows,) the derivative of the residuals with respect to its logarithm, in all experiments that
+    """By name of a loss, the derivative (rows,) of the residuals with respect to its logarithm, in all experiments that
     have it."""
     values = problem.parameters.to_physical(u)
     held = [

@@ -1,4 +1,4 @@
-"""Directions of what no number of a model tells."""
+"""Directions in which the residuals of a fit would move by parts that its model lacks."""
 
 from __future__ import annotations
 
@@ -14,18 +14,19 @@ from .told import Told
 
 
 class Lacking:
-    """Of the motions of a problem at u (free,), each one's once."""
+    """The directions in which what the model lacks would move the residuals, for each motion of a problem at u (free,);
+    each motion's are computed once."""
 
     def __init__(self, problem: FitProblem, u: Array) -> None:
         self._experiments = problem.experiments
         self._parts, self._sizes = (cache(partial(made, problem, u)) for made in (missing_parts, cloth_sizes))
 
     def of(self, group: Sequence[int]) -> list[Told]:
-        """All of a group of motions."""
+        """The directions of a group of motions, each as an error of the model."""
         return [one for i in self._moving(group) for one in (*self._parts(i), *self._sizes(i))]
 
     def beside_contacts(self, group: Sequence[int]) -> list[Told]:
-        """The parts that a group's motions lack; none where none of them has contacts."""
+        """The directions of missing parts in a group of motions; none where none of them has contacts."""
         moving = self._moving(group)
         touching = any(touches(self._experiments[i]) for i in moving)
         return [one for i in moving for one in self._parts(i)] if touching else []

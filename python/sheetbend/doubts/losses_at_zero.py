@@ -27,7 +27,7 @@ def touches(e: Experiment) -> bool:
 
 
 def with_losses(e: Experiment) -> Experiment:
-    """The same motion of a scene that has inputs for these losses, at zero."""
+    """The same experiment, on a scene that has inputs for these losses, at zero."""
     scene = e.scene.shallow()
     scene.has_drag = True
     if touches(e):

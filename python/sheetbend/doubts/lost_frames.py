@@ -25,7 +25,7 @@ WHOLE = 0.25  # of a frame, or of ten: so near to a whole number
 
 
 def lost_frames(problem: FitProblem, q: Array, r: Array, told: Sequence[Told]) -> Iterator[Told]:
-    """Of each recording whose clock is told, its likeliest gap.
+    """The likeliest gap of each recording whose times were given.
 
     Args:
         q: (rows, k) what the parameters take up, at right angles.

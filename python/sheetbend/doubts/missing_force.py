@@ -58,7 +58,7 @@ class Freed:
 
 
 def missing_force(problem: FitProblem, u: Array, judged: Identifiability) -> dict[str, str]:
-    """By free parameter that recordings share, what becomes of it if each recording has a steady force of its own.
+    """By free parameter that recordings share, how it changes if each recording has a steady force of its own.
 
     Costs three tangents of every motion that nothing holds; others are not asked.
 

@@ -44,7 +44,7 @@ def missing_loss(
     known: Mapping[str, float] | None = None,
     refinement: Refinement | None = None,
 ) -> dict[str, str]:
-    """By free parameter, the motion whose losses the model does not have, or does not have so large.
+    """By free parameter, the motion that loses energy in a way that the model lacks, or has too small.
 
     Losses that are given are tested first (`held_losses`), then all losses by one simulation with the other integrator.
     Where that has no answer, it tells nothing, nor of motions with contacts, where another integrator or substep moves

@@ -88,8 +88,8 @@ def _stretch(e: Experiment, x: Array, compliance: Array) -> Iterator[Part]:
 
 
 def _curvature(e: Experiment, rest: Array, compliance: Array) -> Iterator[Part]:
-    """Of rods that are straight at rest, about either axis of their sections: a turn at each joint, which is the
-    curvature times its share of the length, as compliances are."""
+    """The rest curvature that straight rods lack, about either axis of their sections. It turns each joint by the
+    curvature times the joint's share of the length, which compliances have too."""
     first = at = 0
     for g in e.scene.groups:
         own = first + np.arange(g.rest.size)

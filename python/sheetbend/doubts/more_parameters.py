@@ -9,7 +9,7 @@ from ..quantities.parameters import Parameter, Parameters
 
 
 def with_parameter(problem: FitProblem, more: Parameter, expanded: Sequence[Parameter] | None = None) -> FitProblem:
-    """The same problem with one parameter more, the last one.
+    """The same problem with one more parameter at the end.
 
     Args:
         expanded: those of the single experiments, where it is private.

@@ -60,14 +60,14 @@ class _Group:
 
 @dataclass(frozen=True)
 class _End:
-    """Where a few steps end, (free,), and the residuals (rows,) there."""
+    """The end of a few steps, (free,), and the residuals (rows,) there."""
 
     u: Array
     r: Array
 
 
 def other_losses(problem: FitProblem, u: Array) -> dict[str, str]:
-    """By free parameter, the loss of its motion with which a fit would leave much less, the best of those tried.
+    """By free parameter, a loss with which a fit of its motion would leave much less, the best of those tried.
 
     Takes two simulations for each loss, and a Jacobian and a third where these leave less; for a restitution two more
     Jacobians in all. A loss with which the motion has no answer tells nothing.
@@ -147,7 +147,7 @@ def _undamped(problem: FitProblem, groups: list[_Group], only: Callable[[Experim
 
 
 def _searched(free: FitProblem, u: Array) -> _End | None:
-    """Where a search ends that begins at u (free - 1,) with a damping of a third of a frame interval."""
+    """The end of a search from u (free - 1,) with a damping of a third of a frame interval."""
     try:
         end = refit(free, np.append(u, math.log(FRAMES[0])), "auto", SEARCHED, TOLERANCE)
         ok, r, _ = free.evaluate(end.u, jacobian=False)
@@ -174,8 +174,8 @@ def _bounces(problem: FitProblem, u: Array, J: Array, groups: list[_Group]) -> I
 
 
 def _reached(more: FitProblem, u: Array, J: Array | None, groups: list[_Group]) -> _End | None:
-    """Where two Gauss-Newton steps from u end, the first with the Jacobian J of another problem if it is given; None
-    where that first one leaves no less of any group, or where there is no answer."""
+    """The end of two Gauss-Newton steps from u, the first with the Jacobian J of another problem if it is given. None
+    where the first step leaves no less in any group, or where there is no answer."""
     try:
         ok, r, own = more.evaluate(u, jacobian=J is None)
         first = limited_step(more, u, r, own if J is None else J) if ok else u
@@ -193,8 +193,8 @@ def _reached(more: FitProblem, u: Array, J: Array | None, groups: list[_Group]) 
 
 
 def limited_step(problem: FitProblem, u: Array, r: Array, J: Array) -> Array:
-    """Where a Gauss-Newton step of limited length from u ends. A number on a logarithmic scale that grows takes the
-    step of its own unit: one that ran off to nothing comes back at once."""
+    """The end of a Gauss-Newton step of limited length from u. A parameter on a logarithmic scale that grows takes the
+    step of its own unit, so one that ran off toward zero comes back at once."""
     step = np.maximum(-solved(J, r), -STEP)
     log = np.array([problem.parameters[name].log for name in problem.parameters.free])
     step = np.where(log & (step > 0.0), np.log1p(np.abs(step)), np.minimum(step, STEP))

@@ -74,7 +74,7 @@ class Comparison:
         return first, second
 
     def errors(self, rows: int) -> RecordingFit:
-        """As a row of the report: distances in m, or angles in rad where the experiment has a radius."""
+        """The row of the report: distances in m, or angles in rad where the experiment has a radius."""
         radius = self.experiment.radius
 
         def error(distance: float | None) -> float | None:

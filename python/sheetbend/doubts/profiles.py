@@ -28,7 +28,7 @@ together would waste steps on few rows, and stop too early on many."""
 
 @dataclass(frozen=True)
 class Elsewhere:
-    """Where another search of the same minimum ended.
+    """The end of another search, in the same cost.
 
     Attributes:
         rise: of the cost there over that at the estimate.
@@ -107,7 +107,8 @@ class Profiles:
         return profiles
 
     def profile(self, wanted: Wanted) -> Profile:
-        """Both ends from the path along the profile, and from refits on the sides where it does not settle."""
+        """The profile of a parameter: both ends from the path along it, and from refits on the sides where the path
+        does not settle."""
         name, part = wanted.name, self._part(wanted.name)
         linear, parameters = self._picture(part), part.parameters
         if linear is None:
@@ -169,8 +170,9 @@ class Profiles:
         return self._parts[name]
 
     def _nearest(self, held: FitProblem, part: FitProblem, name: str, at: float) -> tuple[Array, float]:
-        """Where to begin with a parameter held at an internal value, and the cost there: where the others ended at the
-        nearest value known, or on the line through two of these (of the linear picture, where there is but one)."""
+        """A start for the refit with a parameter held at an internal value, and the cost there: where the others ended
+        at the nearest known value, or on the line through two of these (of the linear picture, where there is one
+        alone)."""
         known = self._ends[name]
         near, *others = sorted(known, key=lambda other: abs(other - at))
         if others:
@@ -196,7 +198,7 @@ class Profiles:
 
 
 def _profiled(profiles: Profiles, wanted: Wanted) -> tuple[Profile, list[Elsewhere], tuple[int, int]]:
-    """In a worker: a profile, lower minima on its way, and what it took."""
+    """Compute a profile in a worker; return it with the lower minima on its way and the simulations that it took."""
     known, before = len(profiles.lower), counted()
     profile = profiles.profile(wanted)
     after = counted()

@@ -112,8 +112,8 @@ def _otherwise(e: Experiment, ends: list[TurningEnd]) -> Experiment:
 
 
 def _reached(other: FitProblem, u: Array, J: Array) -> tuple[Array, Array] | None:
-    """Where a few Gauss-Newton steps from u end, the first with the Jacobian J of another problem, and (rows,) what is
-    left there; None where there is no answer."""
+    """The end of a few Gauss-Newton steps from u, the first with the Jacobian J of another problem, and the residuals
+    (rows,) there; None where there is no answer."""
     try:
         ok, r, _ = other.evaluate(u, jacobian=False)
         if not ok:

@@ -19,7 +19,7 @@ from ..arrays.timeseries import Array
 from ..errors import SheetbendError
 from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
-from ..motion.simulate import divergence
+from ..motion.core_terms import divergence
 from ..objects.markers import Place
 from ..quantities.quantities import Quantity
 from ..quantities.wording import short

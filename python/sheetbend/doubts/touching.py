@@ -64,7 +64,7 @@ def pressed_in(problem: FitProblem, u: Array, contacts: Sequence[ContactFit]) ->
 
 
 def kinks(problem: FitProblem, u: Array, estimates: Sequence[Estimate]) -> tuple[Kinks, ...]:
-    """For each estimate with an interval, how many contacts differ between the motions at its ends.
+    """How many contacts differ between the motions at the two ends of each interval.
 
     The other parameters are refitted to first order. Takes two simulations for each of these.
 
@@ -98,13 +98,13 @@ def _contacts(differs: Array) -> int:
 
 
 def _modes(problem: FitProblem, u: Array) -> list[Mapping[str, Array]]:
-    """By experiment and contact (frames, particles)."""
+    """Contact modes (frames, particles) of each experiment, by name of the contact."""
     return [{} if motion is None else motion.contact_modes for motion in _runs(problem, u)]
 
 
 def _runs(problem: FitProblem, u: Array) -> list[Trajectory | None]:
-    """By experiment its motion at the substeps that are nearest to its frames; None where nothing can touch, or the
-    motion has no answer."""
+    """The motion of each experiment at the substeps nearest to its frames; None where nothing can touch, or the motion
+    has no answer."""
     found: list[Trajectory | None] = []
     for e, recording in zip(problem.experiments, problem.recordings, strict=True):
         found.append(None)

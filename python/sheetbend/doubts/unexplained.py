@@ -65,7 +65,7 @@ class Shares:
 def unexplained(
     problem: FitProblem, comparisons: Sequence[Comparison], alike: float, u: Array | None = None
 ) -> dict[str, str]:
-    """By free parameter, the fitted motion that it acts on and that the fit does not explain.
+    """By free parameter, the fitted motion that depends on it and that the fit does not explain.
 
     Args:
         comparisons: of all experiments, at the values of the fit.
@@ -84,7 +84,7 @@ def unexplained(
 
 
 def shares(c: Comparison, values: Values | None = None) -> Shares | None:
-    """Of the fitted part of a comparison; None where it holds no motion.
+    """Shares of the fitted part of a comparison; None where it holds no motion.
 
     Args:
         values: see `carried_baselines`.

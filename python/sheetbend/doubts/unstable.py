@@ -22,7 +22,7 @@ SAME = 1e-6  # m: shapes nearer than this everywhere are one, as those of `equil
 
 
 def unstable_rests(problem: FitProblem, u: Array) -> dict[str, str]:
-    """By free parameter, that a shape at rest which depends on it would snap to another one a little farther. Takes one
+    """By free parameter, why a shape at rest that depends on it would snap to another one a little farther. Takes one
     Jacobian, and two equilibria for each static experiment.
 
     Args:

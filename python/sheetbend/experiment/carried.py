@@ -120,7 +120,7 @@ def _motion(e: Experiment, grip: Sequence[int], times: Array, every: Values) -> 
 
 
 def _rigid(before: Array, after: Array, x: Array) -> Array:
-    """Where the rigid motions of a grip take points: (frames, markers, 3).
+    """Points (frames, markers, 3) carried along by the rigid motions of a grip.
 
     Args:
         before, after: (points, 3) or (frames, points, 3), the grip.

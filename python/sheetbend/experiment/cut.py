@@ -27,7 +27,7 @@ def shot(e: Experiment) -> Shooting | None:
 
 
 def in_steps(e: Experiment, steps: int) -> Experiment:
-    """With states that take so many steps in an evaluation at most, where it is shot in windows."""
+    """The experiment, whose states take at most `steps` steps in an evaluation where it is shot in windows."""
     own = shot(e)
     return e if own is None else replace(e, shooting=replace(own, steps=steps))
 
@@ -42,7 +42,7 @@ def start_quantities(scene: Scene) -> tuple[str, ...]:
 
 
 def cut(e: Experiment) -> Experiment:
-    """With every part of its `shooting` known but the loss and the states.
+    """The experiment with every part of its `shooting` known but the loss and the states.
 
     Raises:
         InputError: its scene has no quantities of its start, or a window would hold too little.

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from .. import _core
 from ..arrays.checks import finite
 from ..errors import InputError
-from ..motion.simulate import divergence
+from ..motion.core_terms import divergence
 from ..motion.solver import Solver
 from ..objects.markers import on_particle
 from ..recording.force_recording import ForceRecording

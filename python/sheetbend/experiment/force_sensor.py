@@ -257,7 +257,7 @@ def end_of_rope(scene: Scene, rope: str, end: str, path: str = "force") -> list[
 
 
 def carried(scene: Scene, particles: Sequence[int]) -> list[int]:
-    """Those of a support's particles whose mass is a rope's, a cloth's or a rigid body's: pivots and stubs have masses
+    """The particles of a support whose mass is that of a rope, a cloth or a rigid body; pivots and stubs have masses
     that nothing uses."""
     every = (*scene.ropes.values(), *scene.cloths.values(), *scene.bodies.values())
     bodies = {int(p) for body in every if body.name != GROUND for p in body.particles}

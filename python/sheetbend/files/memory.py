@@ -77,7 +77,7 @@ def in_words(size: int) -> str:
 
 
 def least_in_words(size: int) -> str:
-    """The same rounded up, so that the amount as written is enough."""
+    """A number of bytes in words, rounded up, so that the amount as written is enough."""
     unit = next((u for u in ("GB", "MB", "kB") if size >= UNITS[u]), "B")
     if unit == "B":
         return f"{size} B"

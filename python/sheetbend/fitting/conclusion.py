@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..doubts.beginnings import of_beginnings
+from ..doubts.beyond_bounds import beyond_bounds
 from ..doubts.bootstrap import bootstrap, wider
 from ..doubts.conclude import judged_parameters
 from ..doubts.contradictions import between_parts, together
@@ -18,7 +19,6 @@ from ..doubts.losses import loss_doubts
 from ..doubts.missing_force import missing_force
 from ..doubts.missing_loss import missing_loss
 from ..doubts.prediction import predicted_values
-from ..doubts.pressed import pressed_to_bounds
 from ..doubts.profiles import Elsewhere
 from ..doubts.spin import spins_otherwise
 from ..doubts.stuck import bounded_by_sticking
@@ -146,7 +146,7 @@ def _doubts(
         missing_force(at.problem, at.u, judged),
         spin,
         unstable_rests(*fitted),
-        pressed_to_bounds(at.problem, at.u, judged),
+        beyond_bounds(at.problem, at.u, judged),
     )
     return warnings, together(*lacking, drawn_off, contradicted)
 

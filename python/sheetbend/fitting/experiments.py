@@ -40,7 +40,7 @@ def experiments_of(
 
 
 def within(experiments: list[Experiment]) -> list[Experiment]:
-    """The same experiments, whose windows lie within their recordings.
+    """The experiments, after a check that their windows lie within their recordings.
 
     Raises:
         InputError: one does not.

@@ -48,7 +48,8 @@ SEED = 8
 
 @dataclass(frozen=True)
 class _Noise:
-    """Of the recordings: m (None for the experiments' sigma), and correlation of neighboring frames."""
+    """Noise of planned recordings: its size in m (None for the experiments' sigma), and the correlation of neighboring
+    frames."""
 
     sigma: float | None
     correlation: float
@@ -79,7 +80,7 @@ class _Noise:
         return np.asarray(size[:, None] * e)
 
     def words(self, experiments: Sequence[Experiment]) -> str:
-        """For the report."""
+        """The noise in words, for the report."""
         sizes = sorted({e.sigma if self.sigma is None else self.sigma for e in experiments})
         size = " to ".join(f"{1e3 * s:.3g}" for s in (sizes if len(sizes) < 2 else (sizes[0], sizes[-1])))
         alike = f", {self.correlation:g} from frame to frame" if self.correlation else ", independent in every frame"
@@ -241,7 +242,7 @@ class _Predicted:
 
 
 def _explained(problem: FitProblem) -> FitProblem:
-    """The same problem with recordings of what its parameters' initial values make."""
+    """The problem with recordings that its parameters' initial values make."""
     u = problem.parameters.initial()
     problem.check_start()
     recordings = [

@@ -154,7 +154,7 @@ def _shared(
 def _estimate(
     parameter: Parameter, at: float, reach: float, space: NullSpace, k: int, columns: Sequence[int]
 ) -> Estimate:
-    """Of the shared parameter number k, internally at `at`; `columns` have a covariance."""
+    """The estimate of the shared parameter number k at the internal value `at`; `columns` have a covariance."""
     value = parameter.to_physical(at)
     if k not in space.determined:
         gauges = [gauge.words for gauge in space.gauges if parameter.name in gauge.members]
@@ -171,7 +171,8 @@ def _estimate(
 
 
 def _own(problem: ManyProblem, wanted: Parameters, u: Array, arrow: Arrow, spread: Array) -> tuple[OwnParameter, ...]:
-    """Of each private parameter its values and standard deviations in all recordings, of logarithms on a log scale."""
+    """The values and standard deviations of each private parameter in all recordings; those of logarithms on a log
+    scale."""
     names = [name for name in wanted.free if wanted[name].private]
     place = {name: k for k, name in enumerate(problem.parameters.free)}
     values = np.full((len(names), len(arrow.own)), np.nan)

@@ -60,7 +60,7 @@ class Plan:
         return estimate_of(self.estimates, name)
 
     def report(self) -> str:
-        """As plain text, at most 100 columns wide."""
+        """The plan as plain text, at most 100 columns wide."""
         lines = [f"Plan: rank {self.rank} of {len(self.estimates)} parameters"]
         for section in self.sections():
             lines += ["", *plain_section(section)]

@@ -18,7 +18,7 @@ from ..result.estimate import Estimate
 
 @dataclass(frozen=True)
 class Reached:
-    """Where a search ended.
+    """The minimum at which a search ended.
 
     Attributes:
         problem: what was searched.

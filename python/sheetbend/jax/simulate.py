@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError, choices
+from ..motion.core_terms import substeps
 from ..motion.rollouts import Rollouts
-from ..motion.simulate import substeps
 from ..motion.solver import Solver
 from ..scene.scene import Scene
 from .flat import FlatInputs

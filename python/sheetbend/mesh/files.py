@@ -175,7 +175,7 @@ def _check_corners(content: bytes) -> None:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Without what the library logs of damaged files; their errors are told."""
+    """Silence what the library logs of damaged files; their errors are raised by the readers."""
     log, silent = logging.getLogger("trimesh"), logging.NullHandler()
     before, log.propagate = log.propagate, False  # its parts log under names of their own
     log.addHandler(silent)

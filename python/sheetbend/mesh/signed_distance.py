@@ -38,7 +38,7 @@ class BoxTree:
 
     @classmethod
     def of(cls, corners: Array) -> BoxTree:
-        """Of triangles (m, 3, 3)."""
+        """The tree of triangles (m, 3, 3)."""
         low, high = corners.min(axis=1), corners.max(axis=1)
         middle = 0.5 * (low + high)
         parts, children, triangle, boxes = [np.arange(len(corners))], [], [], []
@@ -96,8 +96,8 @@ def _signed(vertices: Array, triangles: Indices, tree: BoxTree, normals: Array, 
 
 
 def _feature(weights: Array) -> Indices:
-    """Where on a triangle points with these weights (k, 3) are: 0 to 2 at a corner, 3 to 5 on the edge that starts
-    there, 6 between."""
+    """The part of a triangle on which points with weights (k, 3) lie: 0 to 2 a corner, 3 to 5 the edge that starts
+    there, 6 the inside."""
     on = weights > 0.0
     count, first = on.sum(axis=1), on.argmax(axis=1)
     edge = np.where(first == 0, np.where(on[:, 1], 3, 5), 4)

@@ -100,8 +100,8 @@ class SolidMesh:
 
     @cached_property
     def points(self) -> tuple[Array, Array, Array]:
-        """At the quadrature points: gradients (m, q, n, 3) 1/m of the shape functions, volumes (m, q) m^3 of material;
-        and the nodes' shares (m, n) m^3 of each element's."""
+        """The quadrature points: gradients (m, q, n, 3) 1/m of the shape functions, volumes (m, q) m^3 of material, and
+        the share (m, n) m^3 of each node in its element's volume."""
         gradients, volumes, shares = quadrature(self.vertices[self.elements])
         fill = np.asarray(self.fill)[:, None]
         return gradients, volumes * fill, shares * fill

@@ -18,7 +18,7 @@ TIMEOUT = 30.0  # s, to reach a scheduler, or until it has written its file
 
 @contextmanager
 def workers(count: int, address: str | None) -> Iterator[Executor | None]:
-    """Those of a scheduler where an address is given, else `count` processes of this machine.
+    """The workers of a scheduler where an address is given, otherwise `count` processes of this machine.
 
     Raises:
         ConfigError: both are given, or the scheduler cannot be reached.
@@ -65,7 +65,7 @@ def dask(address: str) -> Iterator[Executor]:
 
 @contextmanager
 def processes(count: int) -> Iterator[Executor | None]:
-    """That many processes of this machine, each with one thread of linear algebra; None for one or none."""
+    """`count` processes of this machine, each with one thread of linear algebra; None for a count of one or none."""
     if count < 2:
         yield None
         return

@@ -33,7 +33,7 @@ class Condition:
 
     @staticmethod
     def of(jacobian: Array, names: Sequence[str], window: float | None = None) -> Condition:
-        """From a Jacobian (rows, free) in internal coordinates, rows of priors included."""
+        """The condition of a Jacobian (rows, free) in internal coordinates, rows of priors included."""
         size = np.linalg.norm(jacobian, axis=0)
         seen = np.isfinite(size) & (size > 0.0)
         unseen = tuple(name for name, there in zip(names, seen, strict=True) if not there)

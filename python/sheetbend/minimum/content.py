@@ -102,7 +102,7 @@ def _compiled(module: str) -> str:
 
 
 def _scipy_version() -> str:
-    """Without importing it."""
+    """Version of SciPy, without importing it."""
     try:
         return metadata.version("scipy")
     except metadata.PackageNotFoundError:
@@ -110,7 +110,7 @@ def _scipy_version() -> str:
 
 
 def _processor() -> str:
-    """Its name, which decides the variants that the C library and the linear algebra choose."""
+    """Name of the processor, which decides the variants that the C library and the linear algebra choose."""
     if os.path.exists("/proc/cpuinfo"):
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines():
             if line.startswith("model name"):

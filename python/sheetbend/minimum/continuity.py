@@ -119,7 +119,7 @@ def _nearer(
 
 
 def _in_parts(e: Experiment) -> tuple[Experiment, int]:
-    """With its windows divided into as many as these can be, and how many that are."""
+    """The experiment with each of its windows divided, and into how many parts (FINER); 1 where none is possible."""
     own = shot(e)
     if own is None:
         return e, 1
@@ -183,8 +183,8 @@ def loss(problem: FitProblem, u: Array, experiment: int, size: float) -> Loss:
 
 
 def shot_motions(problem: FitProblem, u: Array) -> tuple[ShotMotion, ...]:
-    """Of every motion that is shot in windows, what its model loses, as it was taken, with its interval at u where it
-    was not given."""
+    """What the model of each motion that is shot in windows loses, with an interval at u where the loss was not
+    given."""
     found: list[ShotMotion] = []
     for i, e in enumerate(problem.experiments):
         own, core = shot(e), problem.core
@@ -249,13 +249,13 @@ class _deviance:
 
 
 def _size(e: Experiment) -> float:
-    """Of a motion, m: rms distance of its markers from their mean places."""
+    """Size of a motion, m: the rms distance of its markers from their mean places."""
     x = e.fitted().positions
     return float(np.sqrt(3.0 * np.nanmean((x - np.nanmean(x, axis=0)) ** 2)))
 
 
 def _with_gap(e: Experiment, gap: float) -> Experiment:
-    """With a loss that leaves such a gap over a window, m."""
+    """The experiment with a loss that leaves a gap of `gap` m over a window."""
     own = shot(e)
     if own is None:
         return e
@@ -264,7 +264,7 @@ def _with_gap(e: Experiment, gap: float) -> Experiment:
 
 
 def _state(e: Experiment, problem: FitProblem, i: int) -> Experiment:
-    """With the states where the problem was evaluated last."""
+    """The experiment with the states at which the problem was evaluated last."""
     own, core = shot(e), problem.core
     if own is None:
         return e

@@ -60,7 +60,8 @@ class Chart:
 
     @classmethod
     def of(cls, columns: Sequence[int], rows: Array, constants: Array) -> Self | None:
-        """From sums (rows, n) and (rows,) that must stay positive; None where no n of them have only tops beside."""
+        """Coordinates for sums (rows, n) with constants (rows,) that must stay positive; None where no n of the sums
+        bound all others."""
         n = len(columns)
         for chosen in map(list, combinations(range(len(rows)), n)):
             A, b = rows[chosen], constants[chosen]
@@ -192,8 +193,8 @@ class Coordinates:
         return lower, upper
 
     def beyond(self, u: Array) -> dict[str, str]:
-        """Of the free parameters in sums that are not positive at internal values u (free,): what the limit is that
-        they have passed, in words such as "inertia_3 = inertia_1 + inertia_2"."""
+        """The free parameters in sums that are not positive at internal values u (free,), each with the limit that it
+        has passed in words, such as "inertia_3 = inertia_1 + inertia_2"."""
         found: dict[str, str] = {}
         for chart in self.charts:
             names = [self.parameters.free[c] for c in chart.columns]

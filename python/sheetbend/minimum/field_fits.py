@@ -96,7 +96,7 @@ def half_widths(weights: Array, shifts: Array, deviations: Array) -> Array:
 
 
 def _erf(x: Array) -> Array:
-    """As SciPy's, which a fit does not need."""
+    """The error function, without SciPy, which a fit does not need."""
     return np.asarray(np.frompyfunc(math.erf, 1, 1)(x), dtype=float)
 
 

@@ -48,8 +48,8 @@ def two_steps(problem: FitProblem, finer: FitProblem, u: Array) -> tuple[Array, 
 
 
 def left_open(parameters: Parameters, u: Array, shift: Array, rest: Array | float) -> dict[str, float]:
-    """By parameter, the half-width of what is left open, in its unit: much less than the shift where the estimate can
-    be moved to the limit, else more.
+    """By parameter, the half-width of what the mesh leaves open, in its unit: much less than the shift where the
+    estimate can be moved to the limit, otherwise more.
 
     Args:
         u, shift: (free,) internal estimate, and how far it is from the limit.

@@ -19,9 +19,10 @@ import numpy as np
 
 from .. import _core
 from ..arrays.timeseries import Array
+from ..errors import NoEquilibriumError
 from ..experiment.cut import shot, start_quantities
 from ..experiment.experiment import Experiment
-from ..motion.equilibrium import NoEquilibriumError, equilibrium
+from ..motion.equilibrium import equilibrium
 from ..motion.solver import Solver
 from ..scene.scene import Scene
 from .lifted import Lifted
@@ -76,7 +77,7 @@ class Growth:
         return None if len(above) == 0 else float(self.times[max(above[0] - 1, 0)])
 
     def to_dict(self) -> dict[str, float | None]:
-        """For JSON: largest (None where it overflows), rate, until."""
+        """Values for JSON: `largest` (None where it overflows), `rate` and `until`."""
         return {
             "largest": self.largest if np.isfinite(self.largest) else None,
             "rate": self.rate,

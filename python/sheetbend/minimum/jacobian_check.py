@@ -48,7 +48,7 @@ class JacobianReport:
         return all(row.passed for row in self.rows)
 
     def to_dict(self) -> dict[str, Any]:
-        """For JSON: each column by name with its relative error and pass or fail."""
+        """Values for JSON: each column by name, with its relative error and whether it passed."""
         columns = {
             r.name: {"largest": r.largest, "differences": r.differences, "noise": r.noise, "passed": r.passed}
             for r in self.rows

@@ -313,7 +313,7 @@ class Evaluator:
         return self._core.state().tobytes()
 
     def capsule(self, coordinates: Coordinates, known: tuple[np.ndarray, Timed] | None = None) -> object:
-        """The same for Ceres, in the coordinates of a search; the problem must outlive it.
+        """The journaled problem for Ceres, in the coordinates of a search; the problem must outlive it.
 
         Args:
             known: a point w and the evaluation there with a Jacobian, which is not made again.

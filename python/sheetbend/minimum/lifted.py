@@ -108,7 +108,7 @@ class Lifted:
         return [*r, self._parameters.prior_residuals(u), *gaps], [*J, self._parameters.prior_jacobian(), *of_gaps]
 
     def with_states(self, u: Array) -> WithStates | None:
-        """None where there is no answer."""
+        """Derivatives with respect to parameters and states at u; None where there is no answer."""
         J = self._residuals(u, True)[1]
         if not J:
             return None

@@ -91,7 +91,7 @@ class Motion:
         self._tangent_at: tuple[Array, Array] | None = None
 
     def at(self, u: Array, states: Array, other: Point | None = None) -> Point | None:
-        """None where a window has no answer.
+        """The point at given parameters and states; None where a window has no answer.
 
         Args:
             other: whose derivatives it takes; None makes its own.
@@ -128,7 +128,7 @@ class Motion:
         ]
 
     def solve(self, u: Array, jacobian: bool = True) -> Point | None:
-        """At the states that are best for u; None where there is no answer.
+        """The point at the states that are best for u; None where there is no answer.
 
         Args:
             jacobian: whether its derivatives are to be its own.
@@ -154,7 +154,8 @@ class Motion:
         return here
 
     def _begun(self, u: Array) -> Point | None:
-        """Where the last solution was if that was for u, else as the states follow the parameters to first order."""
+        """The point at which the solution for u begins: the last solution if that was for u, otherwise its states moved
+        with the parameters to first order."""
         if self._here is not None and np.array_equal(self._here.u, u):
             return self._here
         known = self._known_tangent()
@@ -222,12 +223,13 @@ class Motion:
         return off > BENT**2 * sum(float(part @ part) for part in told) + NEARLY * here.cost
 
     def residuals(self, here: Point) -> tuple[Array, Array]:
-        """Of the data, and of the gaps."""
+        """Residuals of the data, and of the gaps between windows."""
         gaps = [np.zeros(0), *(g.rest for g in self.gaps(here.seen))]
         return np.concatenate([one.data.value for one in here.seen]), np.concatenate(gaps)
 
     def jacobian(self, here: Point) -> tuple[Array, Array]:
-        """Of data and gaps with respect to the parameters, the states following; where a point has its derivatives."""
+        """Derivatives of the residuals of data and gaps with respect to the parameters, with states that follow; for a
+        point that has its derivatives."""
         assert here.own
         along, gaps = self._following(), self.gaps(here.seen)
         data = [one.data.border + one.data.state @ X for one, X in zip(here.seen, along, strict=True)]
@@ -241,8 +243,8 @@ class Motion:
         return np.repeat(between, self.gap_rows // max(len(between), 1))
 
     def with_states(self) -> tuple[Array, Array]:
-        """Of data and gaps with respect to the parameters and all states, where the states were solved for last, by
-        derivatives of that point."""
+        """Derivatives of the residuals of data and gaps with respect to the parameters and all states, at the point of
+        the last solution."""
         here = self._here
         assert here is not None and here.own
         gaps, ends = self.gaps(here.seen), np.cumsum([0, *(one.data.state.shape[1] for one in here.seen)])

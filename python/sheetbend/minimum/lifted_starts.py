@@ -68,7 +68,7 @@ def _begun(plain: FitProblem, i: int, e: Experiment, u: Array) -> Experiment:
 
 
 def _missed(window: LiftedWindow, u: Array, end: Array, state: Array) -> Rows | None:
-    """By how much a window's start misses an end."""
+    """Residuals by which the start of a window misses the end of the one before."""
     rows = window.start(u, state)
     return None if rows is None else replace(rows, value=rows.value - end)
 

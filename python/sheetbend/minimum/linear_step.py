@@ -12,7 +12,7 @@ from .problem import FitProblem
 
 
 def one_step(problem: FitProblem, finer: FitProblem, u: np.ndarray) -> np.ndarray:
-    """Where the minimum goes to first order with the residuals of a finer problem; parameters at a bound stay there.
+    """The minimum to first order, if the residuals were those of a finer problem; parameters at a bound stay there.
 
     Raises:
         SheetbendError: the finer problem has no answer at u, or other rows.
@@ -55,6 +55,6 @@ def gauss_newton(parameters: Parameters, u: np.ndarray, J: np.ndarray, change: n
 
 
 def moves(parameters: Parameters, start: np.ndarray, end: np.ndarray) -> dict[str, float]:
-    """From one internal point to another, of the free parameters, in their units."""
+    """The changes of the free parameters between two internal points, in their units."""
     here, there = parameters.to_physical(start), parameters.to_physical(end)
     return {name: there[name] - here[name] for name in parameters.free}

@@ -9,7 +9,7 @@ from ..quantities.parameters import Parameters
 
 
 def expanded_to(parameters: Parameters, experiments: Sequence[Experiment]) -> Parameters:
-    """With private parameters expanded to one for each experiment that has them."""
+    """The parameters, with each private one expanded to one for each experiment that has it."""
     has = {f"{name}[{e.name}]": q.value for e in experiments for name, q in e.scene.quantities.items()}
     every = parameters.expand([e.name for e in experiments], has)
     private = {f"{p.name}[{e.name}]" for p in parameters.values() if p.private for e in experiments}

@@ -11,8 +11,8 @@ import numpy as np
 from .. import _core
 from ..errors import InputError, refusal
 from ..experiment.experiment import Experiment
+from ..motion.core_terms import divergence
 from ..motion.equilibrium import no_rest
-from ..motion.simulate import divergence
 from ..quantities.parameters import Parameters
 from ..recording.recording import Recording
 from ..statistics.layout import Layout

@@ -186,7 +186,8 @@ class ProfilePath:
         return off > CURVED * math.sqrt(2.0 * self.rise) * at.height
 
     def _made_again(self, at: Point, side: float) -> Point | None:
-        """That point by the Jacobian there, which all others of its side then take; None where there is none."""
+        """The same point computed with the Jacobian there, which all further points of its side then take; None where
+        there is none."""
         ok, _, J = self.evaluate(at.u, True)
         if not ok or not np.isfinite(J).all():
             return None

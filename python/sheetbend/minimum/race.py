@@ -96,7 +96,7 @@ class Course:
         return self.problem if math.isinf(self.lengths[-1]) else self.part(self.problem, self.lengths[-1])
 
     def reference(self, end: Raced) -> Reference:
-        """To compare others with."""
+        """The end of a start, in the form in which ends are compared."""
         _, r, J = self.last.evaluate(end.u)
         floor = 0.5 * FLOOR**2 * len(r)
         return Reference(end.u, end.cost, triangle(J), floor)
@@ -125,14 +125,14 @@ def race(course: Course, points: Sequence[Array], observe: Observe | None = None
 
 
 def groups_of(ended: Sequence[Raced]) -> list[list[Raced]]:
-    """Those that reached a minimum, by its number: group k is at place k - 1."""
+    """The raced starts that reached a minimum, grouped by its number: group k is at place k - 1."""
     return [[end for end in ended if end.group == number] for number in range(1, 1 + max(end.group for end in ended))]
 
 
 def _grouped(
     course: Course, ended: Sequence[Raced], made: dict[bytes, Reference]
 ) -> tuple[list[Raced], list[Reference]]:
-    """The same with groups, and the best end of each group."""
+    """The raced starts with their groups, and the best end of each group."""
     groups: list[Reference] = []
     found = list(ended)
     for i in sorted((i for i, end in enumerate(ended) if math.isfinite(end.cost)), key=lambda i: ended[i].cost):

@@ -183,7 +183,7 @@ class Picture:
         return cls(np.asarray(np.linalg.qr(kept, mode="r")), columns, u)
 
     def rows_with(self, fields: Sequence[Field]) -> Array:
-        """With the rows of the fields' priors."""
+        """The triangle of Jacobian and residuals, with the rows of the fields' priors below."""
         below = []
         for field, own in zip(fields, self.columns, strict=True):
             weight = 1.0 / field.modes.deviations(field.size, field.length)
@@ -263,7 +263,7 @@ def _looked_at(field: Field) -> tuple[Array, Array]:
 
 
 def _narrowed(axis: Array, over: Array) -> Array:
-    """As many points of an axis, closer about those that are possible by their profile over its least."""
+    """An axis with the same number of points, closer together around those that are possible by their profile."""
     inside = np.flatnonzero(over < POSSIBLE)
     first, last = max(int(inside[0]) - 1, 0), min(int(inside[-1]) + 1, len(axis) - 1)
     return np.linspace(axis[first], axis[last], len(axis))
@@ -283,7 +283,8 @@ def _about(axis: Array, k: int) -> Array:
 
 
 def _ends(axis: Array, heights: Array) -> tuple[float | None, float | None]:
-    """Where a profile's heights over its least cross what is likely, in its unit; 0 and None at open ends."""
+    """The ends of what is likely by a profile's heights above its lowest, in the unit of the axis; 0 and None for open
+    ends."""
     likely = np.flatnonzero(heights < LIKELY)
     if not len(likely):
         k = int(np.argmin(heights))

@@ -59,8 +59,9 @@ class Spread:
 
     @staticmethod
     def of(problem: Shareable) -> Spread | None:
-        """Where workers are in use and there are several experiments, all with something to fit. Corrections of driven
-        markers depend on the evaluation before, and stay in this process."""
+        """A problem spread over workers, where workers are in use and there are several experiments that all have
+        something to fit; otherwise None. Corrections of driven markers depend on the evaluation before, so such
+        problems stay in this process."""
         if current() is None or len(problem.experiments) < 2 or problem.estimates_corrections:
             return None
         return Spread(problem) if all(map(problem.acting_on, problem.experiments)) else None

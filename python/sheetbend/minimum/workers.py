@@ -96,7 +96,7 @@ class Common(Generic[S]):
         self._sent = False
 
     def packed(self) -> tuple[bytes, bytes]:
-        """Its key and its content, with what the results' bits depend on besides."""
+        """Key and content of the common part, with what the bits of results depend on besides."""
         if self._packed is None:
             packed = pickle.dumps((content.of_software(), self.value), pickle.HIGHEST_PROTOCOL)
             self._packed = hashlib.blake2b(packed, digest_size=16).digest(), packed
@@ -153,8 +153,8 @@ def _compare(unlike: dict[str, tuple[str, str]], traffic: Traffic) -> None:
 
 
 class _Kept(threading.local):
-    """In each thread of a worker: what calls have in common, by key, the last used one last, and what of the client's
-    software and machine is not that of the worker."""
+    """What the calls of one thread of a worker have in common, by key, the last used one last; and how software and
+    machine differ from the client's."""
 
     def __init__(self) -> None:
         self.values: OrderedDict[bytes, tuple[Any, dict[str, tuple[str, str]]]] = OrderedDict()
@@ -165,7 +165,7 @@ _kept = _Kept()
 
 @one_blas_thread()
 def _answer(work: Callable[[Any, Any], T], key: bytes, common: bytes | None, item: bytes) -> Answer | None:
-    """In a worker; None where it does not have the common part."""
+    """Do a piece of work in a worker; None where the worker does not have the common part."""
     began, values = time.thread_time(), _kept.values
     if key not in values:
         if common is None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..scene.scene import Array, Scene
-from .simulate import divergence, substeps
+from .core_terms import divergence, substeps
 from .solver import Solver
 
 

@@ -24,7 +24,8 @@ UNSEEN = 1e-4  # m, that it may yield where its radius is smaller: what recordin
 def deepest(
     scene: CompiledScene, inputs: Array, times: Array, states: Array, modes: Mapping[str, Array]
 ) -> dict[str, float]:
-    """By contact the largest depth [m] of what touched in the substep before a frame; 0 where nothing did.
+    """The largest depth [m] of the particles of each contact that touched in the substep before a frame; 0 where none
+    did.
 
     Args:
         inputs: flat, of the motion.
@@ -46,7 +47,7 @@ def deepest(
 
 
 def too_deep(scene: Scene, values: Mapping[str, float] | None, depths: Mapping[str, float | None]) -> tuple[str, ...]:
-    """In words the rigid contacts that did not hold what they touch.
+    """Sentences on the rigid contacts in which particles were too deep.
 
     Args:
         values: quantities of the motion that differ from the scene's.

@@ -10,16 +10,12 @@ from numpy.typing import ArrayLike
 
 from .. import _core
 from ..arrays.checks import finite
-from ..errors import SceneError, SheetbendError, refusal
+from ..errors import NoEquilibriumError, SceneError, refusal
 from ..scene.scene import Scene
+from .core_terms import forces_by_group, over_all_nodes, pressures_by_volume, start_of
 from .redundancy import warn_redundant
-from .simulate import forces_by_group, pressures_by_volume, start_of, whole
 
 _FLAT = 1e-9  # of its extent: a sheet this near to a plane has no side to which it buckles
-
-
-class NoEquilibriumError(SheetbendError, RuntimeError):
-    """The solver did not reach an equilibrium from the given start."""
 
 
 def no_rest(scene: Scene, problem: str, positions: np.ndarray) -> NoEquilibriumError:
@@ -112,7 +108,7 @@ class Equilibrium:
         x_bar = (
             None
             if positions_bar is None
-            else whole(
+            else over_all_nodes(
                 "positions_bar",
                 np.asarray(positions_bar, dtype=float),
                 self.nodes.shape,

@@ -148,8 +148,8 @@ class Extrapolated:
         )
 
     def tape_plan(self, steps: Sequence[int], scenes: int = 1, memory: int | None = None) -> _Plan:
-        """Of one scene all runs together, since their tapes stand side by side; of a batch the sum of its runs, which
-        take turns and have the whole budget each."""
+        """The plan of all runs. Those of one scene run together, since their tapes are kept side by side; those of a
+        batch take turns and have the whole budget each."""
         shares = self._shares(steps, memory) if scenes == 1 else [memory] * len(self._runs)
         plans = [s.tape_plan(own, scenes, share) for (s, own, _), share in zip(self._each(steps), shares, strict=True)]
         return _Plan(**{name: sum(getattr(plan, name) for plan in plans) for name in _Plan.__dataclass_fields__})
@@ -177,7 +177,7 @@ class Extrapolated:
 
     @staticmethod
     def _sum(parts: Iterator[Array]) -> Array:
-        """In the order of the runs, so that it has the same bits for any number of threads."""
+        """The sum in the order of the runs, so that it has the same bits for any number of threads."""
         total = next(parts)
         for part in parts:
             total = total + part

@@ -18,7 +18,7 @@ JITTERS = 2  # inputs with other last digits, on which noise is measured
 
 
 def jittered(inputs: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """The same inputs to rounding."""
+    """The inputs, changed by rounding errors."""
     return np.asarray(inputs * (1.0 + np.finfo(float).eps * rng.standard_normal(len(inputs))))
 
 
@@ -44,7 +44,7 @@ class Probe:
         return float((self.core.complex_step(self.inputs, direction, self.steps, 0.0) * self.weights).sum())
 
     def noise(self, direction: np.ndarray, exact: float) -> float:
-        """By how much complex step moves when the last digits of the inputs do."""
+        """How much the complex step changes when the last digits of the inputs do."""
         rng, plain = np.random.default_rng(2), self.inputs
         found = []
         for _ in range(JITTERS):

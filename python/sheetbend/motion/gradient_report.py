@@ -63,7 +63,7 @@ class GradientReport:
         return all(row.passed for row in self.rows) and self.dot_product <= DOT_PRODUCT_BOUND
 
     def to_dict(self) -> dict[str, Any]:
-        """For JSON: each gradient by name with its relative errors and pass or fail."""
+        """Values for JSON: each gradient by name, with its relative errors and whether it passed."""
         gradients = {
             r.name: {
                 "size": r.size,

@@ -20,9 +20,9 @@ from ..errors import InputError
 from ..scene.compiled import CompiledScene
 from ..scene.domain import NOT_NEGATIVE, POSITIVE
 from ..scene.scene import Scene
+from .core_terms import divergence, substeps
 from .gradient_probe import DIFFERENCES_BOUND, JITTERS, LOUD, Probe, jittered
 from .gradient_report import COMPLEX_STEP_BOUND, GradientReport, GradientRow
-from .simulate import divergence, substeps
 from .solver import Solver
 from .tape import budget
 
@@ -214,7 +214,7 @@ class _Checked:
 
 
 def _row(name: str, size: int, entries: Sequence[_Entry]) -> GradientRow:
-    """Of tested entries, relative to the largest."""
+    """The row of the report for some tested entries, with errors relative to the largest."""
     columns = np.array([(e.gradient, e.exact, e.rough, e.error, e.faint, e.rounding) for e in entries]).T
     gradient, exact, rough, error, faint, rounding = columns
     unfelt = bool((np.maximum(np.abs(gradient), np.abs(exact)) <= faint).all())

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from .. import _core
 from ..errors import EmptyGradientError, InputError, choices
 from ..scene.scene import Scene
-from .simulate import divergence, substeps, whole
+from .core_terms import divergence, over_all_nodes, substeps
 from .solver import Solver
 from .tape import TapePlan, planned
 
@@ -106,7 +106,7 @@ class Rollout:
             UnconvergedError: as `rollout`.
         """
         bar = np.asarray(positions_bar, dtype=float)
-        bar = whole("positions_bar", bar, self.nodes.shape, self._compiled.particles, InputError)
+        bar = over_all_nodes("positions_bar", bar, self.nodes.shape, self._compiled.particles, InputError)
         with divergence(self._scene):
             inputs_bar, recomputed = self._core.reverse(self._inputs, self._tape, self._steps, bar, 0.0)
         by_quantity = self._compiled.theta_bar(self._theta, inputs_bar)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..scene.scene import Scene
-from .simulate import divergence
+from .core_terms import divergence
 from .solver import Solver
 from .tape import budget
 
@@ -89,7 +89,7 @@ class Rollouts:
         return out
 
     def _lengths_of(self, inputs: Array) -> list[int]:
-        """Of the batch's scenes; empty where all have every frame."""
+        """Numbers of frames of the batch's scenes; empty where all scenes have every frame."""
         if self._lengths is None:
             return []
         if len(self._lengths) != len(inputs):

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import _core
-from ..arrays.checks import finite
-from ..errors import DivergenceError, InputError, UnbalancedError, UnconvergedError
+from ..errors import InputError
 from ..files.memory import expect_room
-from ..quantities.kinds import KINDS
 from ..scene.scene import Scene
 from .contact_counts import ContactCounts, contact_counts, contact_modes
+from .core_terms import divergence, forces_by_group, pressures_by_volume, start_of, substeps
 from .depth import deepest
 from .solver import Solver
-
-MOST_SUBSTEPS = 2**31 - 1  # that the core counts
 
 
 @dataclass(frozen=True)
@@ -115,92 +110,3 @@ def simulate(
         nodes,
         velocities,
     )
-
-
-def start_of(scene: Scene, start: ArrayLike, error: type[InputError], field: str = "start") -> np.ndarray:
-    """Positions (particles, 3) m, or (nodes, 3) m of all nodes, such as a motion or an equilibrium starts from.
-
-    Raises:
-        InputError: of the given kind: another shape, NaN, or particles alone where hidden nodes can move.
-    """
-    x = finite(field, start, None, error)
-    if x.shape == (scene.node_count, 3):
-        return x
-    if x.shape != (scene.particle_count, 3):
-        raise error(field, "has the wrong shape", x.shape, f"give {(scene.particle_count, 3)}")
-    if len(scene.free) < len(scene.free_nodes):
-        fix = f"give the positions {(scene.node_count, 3)} of all nodes, such as Equilibrium.nodes or Scene.nodes"
-        raise error(field, "leaves out hidden nodes that can move, such as the frames of rods", x.shape, fix)
-    return x
-
-
-def substeps(times: ArrayLike, h: float) -> list[int]:
-    """Substep numbers of times; raises InputError where a time lies off the grid."""
-    t = finite("times", times, None, InputError).ravel()
-    if len(t) == 0 or (t < 0).any() or (np.diff(t) < 0).any():
-        raise InputError("times", "must be ascending from 0 or later", t[:5].tolist(), "give frame times in s")
-    steps = np.rint(t / h)
-    off = np.abs(t / h - steps) > 1e-6 * np.maximum(steps, 1.0)
-    if off.any():
-        raise InputError(
-            "times",
-            f"do not lie on the grid of substeps of {h:g} s",
-            float(t[off][0]),
-            "choose h so that it divides the frame interval",
-        )
-    if steps[-1] > MOST_SUBSTEPS:
-        raise InputError("times", f"take more than {MOST_SUBSTEPS} substeps of {h:g} s", float(t[-1]), "end earlier")
-    return steps.astype(int).tolist()
-
-
-def forces_by_group(scene: Scene, multipliers: np.ndarray) -> dict[str, np.ndarray]:
-    """Multipliers (..., rows) by group, (..., count, rows)."""
-    forces, row = {}, 0
-    for g in scene.groups:
-        rows = KINDS[g.kind]["rows"]
-        part = multipliers[..., row : row + rows * len(g.particles)]
-        forces[g.name] = part.reshape(*part.shape[:-1], len(g.particles), rows)
-        row += rows * len(g.particles)
-    return forces
-
-
-def pressures_by_volume(scene: Scene, multipliers: np.ndarray) -> dict[str, np.ndarray]:
-    """Multipliers (...,) by volume, which follow those of the groups."""
-    first = scene.compiled.core.rows
-    return {name: multipliers[..., first + v] for v, name in enumerate(scene.volumes.triangles)}
-
-
-@contextmanager
-def divergence(scene: Scene) -> Iterator[None]:
-    """Turns what stops the core's rollouts into the package's errors."""
-    try:
-        yield
-    except _core.Diverged as error:
-        raise DivergenceError(
-            error.substep, error.time, _number(scene, error.particle), scene.name, error.seen
-        ) from error
-    except _core.Unbalanced as error:
-        when = (error.substep, error.time, _number(scene, error.particle))
-        raise UnbalancedError(error.problem, error.fix, *when, error.residual, scene.name) from error
-    except _core.Unconverged as error:
-        raise UnconvergedError(error.iterations, error.residual, scene.name) from error
-
-
-def whole(field: str, bar: np.ndarray, shape: tuple[int, ...], particles: int, error: type[InputError]) -> np.ndarray:
-    """A derivative with respect to positions of all nodes, of this shape (..., nodes, 3), where it may have been given
-    with respect to those of the particles alone.
-
-    Raises:
-        InputError: of the given kind: another shape, or NaN.
-    """
-    own = (*shape[:-2], particles, 3)
-    if bar.shape == shape:
-        return finite(field, bar, shape, error) if not np.isfinite(bar).all() else bar
-    padded = np.zeros(shape)
-    padded[..., :particles, :] = finite(field, bar, own, error)
-    return padded
-
-
-def _number(scene: Scene, place: int) -> int:
-    """The number of the node at a place of the core's arrays."""
-    return place if place < scene.particle_count else place - scene.node_count

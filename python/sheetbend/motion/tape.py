@@ -12,7 +12,7 @@ from .. import _core
 from ..errors import InputError
 from ..files.memory import expect_room, free_memory, in_words, least_in_words
 from ..scene.scene import Scene
-from .simulate import substeps
+from .core_terms import substeps
 from .solver import Solver
 
 

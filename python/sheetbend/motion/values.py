@@ -12,8 +12,8 @@ from .. import _core
 from ..quantities.kinds import KINDS
 from ..scene.group import Group
 from ..scene.scene import Array, Scene
+from .core_terms import forces_by_group
 from .equilibrium import Equilibrium, whole_start
-from .simulate import forces_by_group
 
 
 def constraint_values(

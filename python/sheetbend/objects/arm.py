@@ -136,7 +136,8 @@ def _positive(field: str, value: float) -> None:
 
 
 def _pair(name: str, mass: float, center: float, reduced: float, length: float) -> tuple[float, float]:
-    """Where the pair sits, as parts of the length: in the middle of what keeps all four masses positive.
+    """Places of the pair of masses as shares of the length, in the middle of the range in which all four masses are
+    positive.
 
     With center a = S/m and reduced length r = J/S the end's mass asks for rho^2 < r q and the pivot's for
     rho^2 (L - a) < q (L^2 - a r) - a L (L - r); on the arm's line both leave q between a (L - r)/(L - a) and r.

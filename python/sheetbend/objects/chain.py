@@ -28,7 +28,7 @@ def resample(polyline: ArrayLike, segments: int) -> Array:
 def straight_way(
     direction: ArrayLike | None, clamp_start: ArrayLike | None, clamp_end: ArrayLike | None
 ) -> tuple[str, ArrayLike]:
-    """Where a straight rope points, and the field that says it: its direction, or as a clamp holds it, or along x."""
+    """The direction of a straight rope, and the argument that gave it: `direction`, a clamp, or x by default."""
     ways = {"direction": direction, "clamp_start": clamp_start, "clamp_end": clamp_end}
     return next(((field, way) for field, way in ways.items() if way is not None), ("direction", (1.0, 0.0, 0.0)))
 
@@ -165,7 +165,7 @@ def add_drag(
 
 
 def first_value(scene: Scene, group: str) -> int:
-    """Where a group's own parameters start in the input array "rest"."""
+    """The entry of the input array "rest" at which the parameters of a group's constraints begin."""
     start = 0
     for g in scene.groups:
         if g.name == group:

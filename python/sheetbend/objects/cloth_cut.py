@@ -12,7 +12,7 @@ from .flat_size import FlatSize
 
 @dataclass(frozen=True)
 class Cut:
-    """Where the terms of a cloth go.
+    """One cut of a fabric in a scene: where the terms of a cloth's parts go.
 
     Attributes:
         name: prefix of its groups and of what is the cut's alone.

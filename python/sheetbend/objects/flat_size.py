@@ -75,8 +75,8 @@ class FlatSize(NamedTuple):
                     _move(scene, group, values, place, factors)
 
     def curvatures(self, scene: Scene, group: str, values: Array, corners: Array) -> None:
-        """Likewise for the matrices (3, 3) that make kappa_uu, kappa_vv and kappa_uv of the angles at the edges
-        v0v1, v1v2, v2v0 of triangles of corners (count, 3, 2)."""
+        """Add the terms of the matrices (3, 3) that make kappa_uu, kappa_vv and kappa_uv of the angles at the edges
+        v0v1, v1v2, v2v0 of triangles with corners (count, 3, 2)."""
         if self == AS_MESH:
             return
         rest = scene.group(group)[0].rest

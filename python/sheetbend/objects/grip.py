@@ -144,7 +144,8 @@ class Grip:
         return cls(t, centers + turns @ arm, turns @ d, turns @ _across(d, q))
 
     def smoothed(self, width: float) -> Grip:
-        """The same grip, its motion smoothed over `width` s (`smoothing.smoothed`); one that stays stays as it is."""
+        """The same grip with its motion smoothed over `width` s (`smoothing.smoothed`); a grip that does not move is
+        returned as it is."""
         if self.stays or width <= 0 or len(self.times) < 2:
             return self
         x, d, q = (smoothed(self.times, v, width)[0] for v in (self.position, self.direction, self.director))

@@ -97,8 +97,8 @@ def checked_limits(name: str, unit: str, limits: ArrayLike) -> tuple[float, floa
 
 
 def default_stiffness(made: Making, unit: str) -> float:
-    """With which the lower body alone would touch a linear stop for DURATION: half the period of its mass, or of its
-    inertia about the joint's axis, on that spring. The upper body's where the lower one is held."""
+    """The stiffness with which the lower body alone would touch a linear stop for DURATION, half the period of its mass
+    (or of its inertia about the joint's axis) on that spring. The upper body's where the lower one is held."""
     moved = made.upper if made.upper.role == "free" and made.lower.role != "free" else made.lower
     inertia = moved.inertia_of_nodes()[0] if unit == "m" else _inertia_about(made, moved)
     return float(inertia * (math.pi / DURATION) ** 2)

@@ -44,7 +44,7 @@ class Place:
     body: Body | None = None
 
     def with_offset(self, offset: ArrayLike, normal: ArrayLike = (0.0, 1.0, 0.0)) -> Place:
-        """The same place, standing off by `offset` (3,) m along (tangent, normal, tangent x normal)."""
+        """The same place with an offset of `offset` (3,) m along (tangent, normal, tangent x normal)."""
         off = finite("offset", offset, (3,), SceneError)
         n = finite("normal", normal, (3,), SceneError)
         if not n.any():
@@ -52,7 +52,7 @@ class Place:
         return replace(self, offset=tuple(off.tolist()), normal=tuple((n / np.linalg.norm(n)).tolist()))
 
     def core(self, scene: Scene) -> dict[str, Any]:
-        """As the compiled core takes it: places of four coordinates or more, padded with zero weights."""
+        """The place for the compiled core: four coordinates or more, padded with zero weights."""
         pad = max(4 - len(self.particles), 0)
         dof = (3 * scene.places_of(self.particles)).tolist()
         return {

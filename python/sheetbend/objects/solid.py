@@ -252,7 +252,7 @@ def _refuse_beside(name: str, beside: str, given: Mapping[str, Any]) -> None:
 
 
 def _moduli(name: str, E: ArrayLike | None, count: int) -> float | tuple[float, ...]:
-    """Of clusters: one for all, or one each."""
+    """Young's moduli of clusters: one for all, or one for each."""
     if E is None:
         raise SceneError(f"{name}.E", "is missing", None, "give Young's modulus of the clusters")
     if count == 0:

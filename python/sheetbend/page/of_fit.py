@@ -128,7 +128,7 @@ def _markers_alone(c: Comparison) -> Shown:
 
 
 def _tone(result: FitResult) -> str:
-    """Of the headline, which tells how the fit ended; doubts about values have their own colors."""
+    """Color of the headline, which tells how the fit ended; doubts about values have colors of their own."""
     if not result.converged or result.interrupted:
         return "bad"
     return "good" if all(e.verdict == "identified" for e in result.estimates) else "mixed"

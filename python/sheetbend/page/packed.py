@@ -19,7 +19,7 @@ _SHADES = 255
 
 
 def packed_motions(motions: Sequence[Shown]) -> list[dict[str, Any]]:
-    """Of all motions of a page; frames are left out evenly where there are too many."""
+    """All motions of a page as JSON values; frames are left out evenly where there are too many."""
     counts = [min(len(m.times), MOST_FRAMES) for m in motions]
     sizes = [_bytes_of_a_frame(m) for m in motions]
     total = sum(count * size for count, size in zip(counts, sizes, strict=True))

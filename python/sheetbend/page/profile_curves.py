@@ -36,7 +36,7 @@ class ProfilePicture:
 
 
 def profile_pictures(result: FitData) -> list[ProfilePicture]:
-    """Of the first `MOST` profiles of estimated parameters."""
+    """Pictures of the first `MOST` profiles of estimated parameters."""
     units = {e.name: e.unit for e in result.estimates}
     curves = [curve for curve in result.profiles if curve.name in units]
     return [_picture(curve, units[curve.name]) for curve in curves[:MOST]]

@@ -15,8 +15,8 @@ EDGES = [(i, j) for i, j in combinations(range(8), 2) if np.count_nonzero(CORNER
 
 
 def body_lines(scene: Scene, positions: Array) -> dict[str, Array]:
-    """By body, (frames, 13, 2, 3) m: the edges of the homogeneous box that has its mass and inertia, and the way from
-    its center to the origin of its frame.
+    """Lines (frames, 13, 2, 3) m of each body by name: the edges of the homogeneous box that has its mass and inertia,
+    and the line from its center to the origin of its frame.
 
     Args:
         positions: (frames, nodes, 3) m of all nodes, such as `Trajectory.nodes`.

@@ -109,5 +109,5 @@ def panels_in(
 
 
 def seen_points(points: np.ndarray) -> np.ndarray:
-    """Those of the points (n, 3) that were seen: rows without NaN."""
+    """The points that were seen, of points (n, 3): rows without NaN."""
     return points[np.isfinite(points).all(axis=1)]

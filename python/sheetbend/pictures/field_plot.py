@@ -104,7 +104,7 @@ def _checked(name: str, mesh: TriangleMesh, field: Field) -> Array:
 
 
 def _panels(fields: Sequence[Field], title: str, ax: Any) -> tuple[list[Axes], Axes | Figure]:
-    """As `panels_in`, but new ones are flat or of space, side by side."""
+    """Panels as `panels_in` makes them; new ones are flat or in space, side by side."""
     if ax is not None:
         return panels_in(ax, len(fields), (0.0, 0.0), title)
     figure = new_figure(3.3 * len(fields) + 0.4, 3.9, title or " ")

@@ -78,7 +78,7 @@ class Expression:
         return self.parts.get((), 0.0)
 
     def at(self, values: Mapping[str, float]) -> float:
-        """Its number at values of its quantities."""
+        """The value of the expression at values of its quantities."""
         return sum(c * math.prod(VALUES[f](values[q]) for q, f in factors) for factors, c in self.parts.items())
 
 
@@ -123,7 +123,7 @@ def _plane_rotation(axis: int, quantity: str) -> list[tuple[dict[str, str], Arra
 
 
 def rotation(names: Sequence[str]) -> Array:
-    """The same sum as a matrix of expressions."""
+    """The rotation of `rotation_products` as a matrix of expressions."""
     found = expressions(np.zeros((3, 3)))
     for factors, matrix in rotation_products(names):
         found = found + matrix * Expression({tuple(sorted(factors.items())): 1.0})

@@ -193,7 +193,8 @@ class Parameters(Mapping[str, Parameter]):
 
     @property
     def roots(self) -> Mapping[str, tuple[str, float]]:
-        """For every name the parameter that carries its value, itself or the end of its ties, and the factor to it."""
+        """For every name, the parameter that carries its value (itself, or the end of its ties) and the factor to
+        it."""
         return self._roots
 
     def replace(self, name: str, **changes: Any) -> Parameters:

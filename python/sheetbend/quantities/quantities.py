@@ -110,5 +110,5 @@ def term(array: str, index: int, coefficient: float, **functions: str) -> Term:
 
 
 def product(array: str, index: int, coefficient: float, functions: Mapping[str, str]) -> Term:
-    """The same, for quantity names held in a mapping."""
+    """A term with one entry: a coefficient times functions of quantities, by name of the quantity."""
     return Term(array, int(index), float(coefficient), tuple(functions.items()))

@@ -48,13 +48,13 @@ def quantity(value: float, parameter: Parameter) -> str:
 
 
 def floor_words(parameter: Parameter, value: float, ceiling: bool, reason: str) -> str:
-    """Of a parameter at or beyond what the solver makes up."""
+    """Words for a parameter at or beyond what the solver itself makes up."""
     side = "above" if ceiling else "below"
     return f"at or {side} {quantity(value, parameter)}, the solver's own ({reason}): no property of the material"
 
 
 def side_words(parameter: Parameter, lower: float | None, upper: float | None) -> str:
-    """Of a parameter that is bounded from one side."""
+    """Words for a parameter that is bounded from one side."""
     if lower is not None:
         return f"at least {quantity(lower, parameter)}: larger values explain the data as well"
     if upper is not None:
@@ -63,7 +63,7 @@ def side_words(parameter: Parameter, lower: float | None, upper: float | None) -
 
 
 def ran_off_words(parameter: Parameter, value: float) -> str:
-    """Of a parameter that a fit moved so far that the data no longer depend on it."""
+    """Words for a parameter that a fit moved so far that the data no longer depend on it."""
     start = parameter.initial if parameter.initial is not None else value
     far = f"ran off from {quantity(start, parameter)} to {quantity(value, parameter)}"
     side = "smaller" if abs(value) < abs(start) else "larger"

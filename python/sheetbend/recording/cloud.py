@@ -95,7 +95,8 @@ class Cloud(Recording):
         return np.asarray(self.positions[number][self.mask[number]])
 
     def named(self, name: str) -> Cloud:
-        """The same under another name, with frames as wide: pieces of one cloud fit each other."""
+        """The same cloud under another name. Its frames keep their width, so that pieces of one cloud fit each
+        other."""
         return self._derive(name=name)
 
     def closest_among(self, points: Array) -> Array:

@@ -22,7 +22,7 @@ def dominant_direction(positions: Array) -> Array:
 
 
 def along(positions: Array, direction: Array) -> Array:
-    """That coordinate of the motion (frames,) m; unseen markers count as being at their mean."""
+    """The motion (frames,) m along the direction; unseen markers count as being at their mean."""
     coordinate: Array = np.einsum("fmk,mk->f", np.nan_to_num(positions - mean_position(positions)), direction)
     return coordinate
 

@@ -114,7 +114,7 @@ def padded(frames: Sequence[Array]) -> Array:
 
 
 def check_points(where: str, points: Array) -> None:
-    """Of a cloud: that points (n, 3) are numbers; `where` they stand is told."""
+    """Check that the points (n, 3) of a cloud are numbers; errors name `where` they are."""
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if bad.size:
         fix = "leave out points that the camera did not see"

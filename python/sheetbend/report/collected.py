@@ -68,7 +68,8 @@ class Collected:
 
     @staticmethod
     def of(fits: Mapping[str, FitData]) -> Collected:
-        """From the fits of specimens, by name. Private parameters, one for each recording, are in the table alone.
+        """Collect the fits of specimens by name. Private parameters, which each recording has for itself, are in the
+        table alone.
 
         Raises:
             InputError: there are none.
@@ -80,7 +81,7 @@ class Collected:
         return Collected(dict(fits), tuple(_trait(name, fits) for name in names))
 
     def report(self) -> str:
-        """As plain text."""
+        """The table and the population as plain text."""
         headers = ("parameter", "specimens", "mean", "95 % interval", "unit", "spread", "95 % of it")
         notes = [
             ("spread", "standard deviation between specimens, the errors of their fits taken out; % of logarithms")

@@ -244,7 +244,7 @@ def _correlations(result: FitData) -> Section:
 
 
 def _grown(growth: MotionGrowth) -> str:
-    """Of small displacements along one motion, at the end of the fit."""
+    """How small displacements grow along one motion, at the end of the fit."""
     largest = growth.largest[1]
     size = "without limit" if largest is None else f"{largest:.2g} times"
     until = "" if growth.until[1] is None else f"; beyond {growth.until[1]:.3g} s nothing can be derived from it"

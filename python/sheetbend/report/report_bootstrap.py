@@ -8,7 +8,7 @@ from .tables import Section
 
 
 def bootstrap(result: FitData) -> Section:
-    """Its intervals, beside the half-widths that residuals give."""
+    """The section on bootstrap intervals, beside the half-widths that residuals give."""
     found = result.bootstrap
     if found is None:
         return Section("Bootstrap")

@@ -11,7 +11,7 @@ LOSSES = "a drag or damping that the model lacks is looked for to first order, s
 
 
 def contact_sections(result: FitData) -> list[Section]:
-    """Both sections; empty where nothing can touch."""
+    """The two sections on contacts; empty where nothing can touch."""
     return [_contacts(result), _kinks(result)]
 
 

@@ -10,7 +10,7 @@ from .tables import Section
 
 
 def driven_sections(result: FitData) -> list[Section]:
-    """Both sections; empty where nothing is driven or shifted."""
+    """The sections on predictions without physics and on clocks; empty where nothing is driven or shifted."""
     return [_without_physics(result), _clocks(result)]
 
 

@@ -54,7 +54,7 @@ class Scores:
 
     @property
     def blend(self) -> float | None:
-        """The same of the blend; None unless every recording has one."""
+        """Mean error of the blend over the recordings, m; None unless every recording has one."""
         blends = [row.blend for row in self.rows if row.blend is not None]
         return float(np.mean(blends)) if len(blends) == len(self.rows) else None
 

@@ -43,7 +43,7 @@ def plain_section(section: Section) -> list[str]:
 
 
 def rich_section(section: Section) -> list[object]:
-    """The same as rich renderables.
+    """The section as rich renderables.
 
     Raises:
         MissingExtraError: rich is not installed.
@@ -81,7 +81,7 @@ def _table(section: Section) -> list[str]:
 
 
 def flush_left(section: Section) -> list[bool]:
-    """Of each column: words are flush left, numbers flush right."""
+    """Whether each column is flush left, as words are; numbers are flush right."""
     words = {
         "parameter",
         "with",

@@ -74,7 +74,7 @@ def checked_inertia(
 
 
 def nodes_of(inertia: Inertia, start: Start) -> tuple[Array, Array]:
-    """Where a body's nodes start, and how fast they move: (4, 3) and (4, 3)."""
+    """Initial positions (4, 3) and velocities (4, 3) of a body's nodes."""
     arms = np.array([start.frame @ inertia.center, *(start.frame @ inertia.principal()[1]).T])
     x, v = arms.copy(), np.cross(start.spin, arms)
     x[0] += start.at

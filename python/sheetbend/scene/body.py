@@ -176,7 +176,7 @@ class Body:
         return np.asarray(self.axes.T @ way)
 
     def pose(self, motion: HasMotion | ArrayLike, values: Values = None) -> tuple[Array, Array]:
-        """Where the body's frame is.
+        """The pose of the body's frame in the world.
 
         Args:
             motion: a trajectory, or positions (..., nodes, 3) m of all nodes of the scene, such as `Scene.nodes`.
@@ -245,7 +245,8 @@ class Body:
         return {name: q.value for name, q in self.scene.quantities.items()} | dict(changed or {})
 
     def _nodes(self, x: Array) -> tuple[Array, Array]:
-        """Of arrays (..., nodes, 3): what p has, (..., 3), and what the axes have, (..., 3, 3) as columns."""
+        """The part of arrays (..., nodes, 3) that belongs to the center of mass, (..., 3), and to the axes, (..., 3, 3)
+        as columns."""
         if x.ndim < 2 or x.shape[-2] != self.scene.node_count:
             fix = f"give a trajectory, or the positions (..., {self.scene.node_count}, 3) of all its nodes"
             raise SceneError(f"{self.name}.pose", "needs the nodes that hold its axes", x.shape, fix)
@@ -272,7 +273,7 @@ class BodyPoint:
         return self.body.coordinates(self.place)
 
     def at_start(self) -> tuple[Array, Array | None]:
-        """Its place (3,) m and its direction (3,) in the world as the scene was built."""
+        """The place (3,) m and the direction (3,) of the point in the world, as the scene was built."""
         origin, frame = self.body.pose(self.body.scene.nodes)
         return (
             origin + frame @ numbers(self.place, self.body.values()),

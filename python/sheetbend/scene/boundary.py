@@ -118,7 +118,7 @@ class Boundary:
         self._terms.append((np.array([slot[p] for p in which]), values, dict(factors)))
 
     def terms(self) -> list[Term]:
-        """Of all motions; their places are known once every driven particle is."""
+        """Terms of all motions; their places are known once every driven particle is."""
         knots = 3 * len(self.driven) * np.arange(len(self.times))[:, None, None]
         found = []
         for slots, values, factors in self._terms:
@@ -128,7 +128,7 @@ class Boundary:
         return found
 
     def moved(self, values: Array) -> Boundary:
-        """The same with other plain motions (knots, driven, 3) m."""
+        """The same boundary with other plain motions (knots, driven, 3) m."""
         made = copy.copy(self)
         made._values = list(np.moveaxis(values, 1, 0))
         return made

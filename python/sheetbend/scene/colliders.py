@@ -321,7 +321,7 @@ def _half_length(collider: Collider, start: ArrayLike, end: ArrayLike) -> float:
 
 
 def _between(collider: Collider, start: ArrayLike, end: ArrayLike) -> tuple[Array, Array]:
-    """Where the frame of such a shape is: the middle of the segment, its third axis along it."""
+    """Origin and rotation of the frame of a shape along a segment: its middle, with the third axis along it."""
     first, last = collider._vector("start", start), collider._vector("end", end)
     return 0.5 * (first + last), _turn_to(f"{collider.name or collider.shape}.end", last - first)
 

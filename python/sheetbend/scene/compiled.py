@@ -13,8 +13,8 @@ from .. import _core
 from ..errors import SceneError, choices, refusal
 from ..quantities.quantities import FUNCTIONS, Term
 from . import pieces
+from .collider_speeds import Fastest, fastest
 from .domain import Domain
-from .fast import Fastest, fastest
 from .kinks import kinks
 from .scene_data import SceneData
 from .settle import SettledStart, settled
@@ -147,7 +147,7 @@ class CompiledScene:
 
     @cached_property
     def _entries(self) -> dict[str, np.ndarray]:
-        """Of the scene's own terms, which every problem on it asks for."""
+        """Entries of the scene's own terms, which every problem on it takes."""
         return self._entries_of(self._terms, self.names)
 
     def _entries_of(self, every: Sequence[Term], names: Sequence[str], extra: int = 0) -> dict[str, np.ndarray]:
@@ -181,7 +181,7 @@ class CompiledScene:
 
     @property
     def shapes(self) -> dict[str, tuple[int, ...]]:
-        """Of the input arrays as users give and get them."""
+        """Shapes of the input arrays as users give and get them."""
         return {
             name: (self.particles, *shape[1:]) if name in OVER_NODES else shape for name, shape in self._shapes.items()
         }

@@ -127,7 +127,7 @@ class Contacts:
         return sum(c.nodes.size for c in self.contacts if c.of_body)
 
     def counted(self) -> dict[str, int]:
-        """By name, of each contact how many particles may touch, and of pairs with friction how many of them."""
+        """By name of a contact, how many particles may touch; for pairs with friction, how many pairs."""
         sizes = {c.name: len(c.particles) for c in self.contacts}
         return sizes if self.pair_friction is None else {**sizes, self.pair_friction.name: self.pair_friction.room}
 

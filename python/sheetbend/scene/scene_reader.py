@@ -329,7 +329,7 @@ class SceneReader:
 
 
 def file_layout(scene: Scene) -> dict[str, list[int]]:
-    """Where the input arrays stand, as a file says it: without those of contacts where there are none."""
+    """The layout of the input arrays in a file: without the arrays of contacts where there are none."""
     touches = bool(scene.contacts.contacts)
     left_out = {"contact_weight"} if touches else set(CONTACT_ARRAYS)  # the first of those that files did not have
     own = scene.compiled.layout.items()
@@ -337,7 +337,7 @@ def file_layout(scene: Scene) -> dict[str, list[int]]:
 
 
 def _layout(scene: Scene) -> Mapping[str, tuple[int, int]]:
-    """Where the input arrays stand, before the scene is compiled."""
+    """The layout of the input arrays before the scene is compiled."""
     found, offset = {}, 0
     for name, values in scene.base_arrays().items():
         found[name] = (offset, np.size(values))

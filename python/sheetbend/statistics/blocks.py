@@ -146,7 +146,7 @@ def _compared(
     taken: float,
     drawn: Array,
 ) -> Contradiction | None:
-    """None where a part is too small, or where the parts have nothing to compare."""
+    """Compare the parts of a split; None where a part is too small, or where there is nothing to compare."""
     if (split.part < 0).any():
         mine = split.part >= 0
         kept = np.append(mine, np.ones(len(residuals) - len(mine), dtype=bool))
@@ -230,12 +230,12 @@ def independent(every: Array) -> list[int]:
 def _told(
     chance: float, split: Split, shared: list[int], step: Array, V: Array, moved: Array, t: float
 ) -> Contradiction:
-    """In terms of single parameters: each one's part that differs most from the others."""
+    """The contradiction in terms of single parameters: for each, the part that differs most from the others."""
     count, parts = len(shared), len(split.names)
     coding = np.vstack([np.eye(parts - 1), -np.ones(parts - 1)])
 
     def difference(j: int, k: int) -> Difference:
-        """Of u + d_k and the mean of the others, u - d_k/(parts - 1)."""
+        """The difference between u + d_k and the mean of the others, u - d_k/(parts - 1)."""
         common, d = np.zeros(len(step)), np.zeros(len(step))
         common[j] = 1.0
         d[[count * (m + 1) + j for m in range(parts - 1)]] = coding[k]

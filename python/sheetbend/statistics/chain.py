@@ -33,7 +33,7 @@ class Window:
     rest: Array
 
     def compressed(self) -> Window:
-        """As many rows as columns at most, of the same sums of squares."""
+        """The window with at most as many rows as columns, and the same sums of squares."""
         q, p = self.state.shape[1], self.border.shape[1]
         if len(self.rest) <= q + p + 1:
             return self
@@ -116,7 +116,8 @@ class Chain:
         return found[::-1]
 
     def covariances(self) -> list[tuple[Array, Array]]:
-        """Of every state its covariance (q, q), the border's numbers known, and that with the next one (q, next)."""
+        """Of every state, with the border's numbers known: its covariance (q, q), and that with the next state (q,
+        next)."""
         found: list[tuple[Array, Array]] = []
         for own, onward, _, _ in reversed(self._rows):
             behind = found[-1][0] if found else np.zeros((0, 0))

@@ -120,11 +120,11 @@ class Sandwich:
         self._layout = layout
 
     def of_estimate(self) -> Covariance:
-        """Of the parameters."""
+        """Covariance of the parameters."""
         return self._of(self._root)
 
     def at_right_angles(self) -> Covariance:
-        """Of the coordinates along the columns of `Q`."""
+        """Covariance of the coordinates along the columns of `Q`."""
         return self._of(np.eye(len(self._root)))
 
     @cached_property
@@ -140,7 +140,7 @@ class Sandwich:
         return spectral_covariance(self._grid, self._data, self._grid.kinds)[0]
 
     def _of(self, root: Array) -> Covariance:
-        """Of root (p, p) times the coordinates along `Q`."""
+        """Covariance of root (p, p) times the coordinates along `Q`."""
         influence = self._data @ root.T  # of a row on the estimate
         variance = float(self._residuals @ self._residuals) / self._degrees
         from_data = variance * (influence.T @ influence)

@@ -32,7 +32,8 @@ def open_estimate(
     more: tuple[float, float] = (0.0, 0.0),
     verdict: str = "not identifiable",
 ) -> Estimate:
-    """Of a parameter without an interval, in words why; `more`: discretization and systematic parts."""
+    """The estimate of a parameter without an interval, with the reason in words; `more`: its parts from the
+    discretization and from systematic errors."""
     return Estimate(
         name=parameter.name,
         value=value,
@@ -49,7 +50,7 @@ def open_estimate(
 
 
 def closed_estimate(parameter: Parameter, value: float, lower: float, upper: float) -> Estimate:
-    """Of a parameter whose whole interval comes from the residuals, identified or weak."""
+    """The estimate of a parameter whose whole interval comes from the residuals: identified or weak."""
     half = (upper - lower) / 2
     verdict, words = known(parameter, value, lower, upper)
     return Estimate(
@@ -104,8 +105,8 @@ def clipped(parameter: Parameter, ends: Ends) -> Ends:
 
 
 def widened(parameter: Parameter, value: float, ends: Ends, more: float) -> Ends:
-    """Both ends moved out by the other parts, up to the parameter's bounds; a factor on a log scale keeps them
-    positive."""
+    """Both ends of an interval moved out by its other parts, at most to the parameter's bounds; on a log scale by a
+    factor, which keeps them positive."""
     lower, upper = ends
     factor, shift = (1 + more / value, 0.0) if parameter.log else (1.0, more)
     return (

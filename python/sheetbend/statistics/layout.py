@@ -15,7 +15,7 @@ Integers = NDArray[np.integer[Any]]
 
 @dataclass(frozen=True)
 class Layout:
-    """Where each residual row comes from: integer arrays of shape (rows,).
+    """The origin of each residual row, as integer arrays (rows,).
 
     Attributes:
         recording: which recording; rows of different recordings are independent.
@@ -60,7 +60,7 @@ class Layout:
         return np.zeros_like(self.frame) if self.clock is None else self.clock
 
     def of(self, rows: NDArray[Any]) -> Layout:
-        """That of some rows: (rows,) bool or numbers."""
+        """The layout of some rows, given as (rows,) bool or as their numbers."""
         places = (self.recording, self.channel, self.frame, self.kinds, self.clocks)
         return Layout(*(place[rows] for place in places))
 

@@ -66,7 +66,7 @@ def left_out(
     taken: float = 0.0,
     errors: Array | None = None,
 ) -> tuple[LeftOut, ...]:
-    """Of each parameter that recordings share, the part that moves it most, against its reach.
+    """For each parameter that recordings share, the part of the data that moves it most, against its reach.
 
     Parameters that the rest of the data leaves open are not in it, and parts of which the rest has too few rows.
 

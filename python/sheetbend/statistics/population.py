@@ -24,7 +24,7 @@ _WIDEST = 1e3  # of the standard deviation of the estimates: where the upper end
 
 @dataclass(frozen=True)
 class Population:
-    """Of values (n,) with their variances.
+    """The population of values (n,) with known variances.
 
     Attributes:
         mean, mean_interval: of the population, with its 95 % interval.

@@ -99,8 +99,8 @@ def profile_interval(
 
 
 def _crossing(height: Callable[[float], float], start: float, step: float, bound: float) -> float | None:
-    """Where the height reaches 1, by doubling steps, then safeguarded secants; None if it never does, NaN if only
-    infinite heights lie beyond."""
+    """The place where the height reaches 1, by doubling steps, then by safeguarded secants; None if it never does, NaN
+    if only infinite heights lie beyond."""
     inside, low = start, 0.0
     for doubling in range(_DOUBLINGS + 1):
         outside = start + step * 2.0**doubling

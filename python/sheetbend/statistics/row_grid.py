@@ -64,7 +64,7 @@ class RowGrid:
         return found
 
     def scores(self, influence: Array) -> list[Array]:
-        """Per recording (frames, p): what each frame adds to the estimate, summed over channels."""
+        """For each recording (frames, p): what each frame adds to the estimate, summed over channels."""
         rows = influence * self.residuals[self._frame, self._channel][:, None]
         sums = np.zeros((self._recording.max() + 1, self.frames, influence.shape[1]))
         np.add.at(sums, (self._recording, self._frame), rows)

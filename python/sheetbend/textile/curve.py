@@ -63,7 +63,7 @@ class Curve:
 
     @property
     def work(self) -> float:
-        """Of the load along the whole path, J/m^2."""
+        """Work of the load along the whole path, J/m^2."""
         return float(np.sum(np.diff(self.deformation) * (self.load[1:] + self.load[:-1]) / 2.0))
 
     def piece(self, start: int, stop: int) -> Curve:
@@ -145,7 +145,7 @@ class Curve:
         return _crossing(self.deformation, self.load, deformation)
 
     def deformation_at(self, load: float) -> float:
-        """Of a branch; NaN where it does not go."""
+        """Deformation of a branch at a load; NaN where the branch does not reach it."""
         return _crossing(self.load, self.deformation, load)
 
 

@@ -10,9 +10,9 @@ from typing import TypedDict
 import numpy as np
 
 from ..arrays.checks import is_number
-from ..errors import InputError, MeshError
+from ..errors import InputError, MeshError, NoEquilibriumError
 from ..mesh import TriangleMesh, disk
-from ..motion.equilibrium import Equilibrium, NoEquilibriumError, equilibrium
+from ..motion.equilibrium import Equilibrium, equilibrium
 from ..objects.cloth import add_cloth
 from ..objects.fabric import Fabric
 from ..scene.colliders import Cylinder

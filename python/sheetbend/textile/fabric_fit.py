@@ -9,9 +9,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..arrays.timeseries import Array
-from ..errors import InputError
+from ..errors import InputError, NoEquilibriumError
 from ..minimum.linear_algebra import one_blas_thread
-from ..motion.equilibrium import NoEquilibriumError
 from ..objects.fabric import Fabric
 from ..objects.laws import Spline, Stiffening
 from ..optional import require
@@ -140,7 +139,7 @@ class FabricFit:
 
 
 def _widening(misfit: float, freedom: int) -> float:
-    """By what intervals are widened (Birge 1932)."""
+    """The factor by which intervals are widened where readings contradict each other (Birge 1932)."""
     return math.sqrt(max(1.0, misfit / freedom)) if freedom > 0 else 1.0
 
 
@@ -251,7 +250,7 @@ class _Evaluation:
 def estimates_of(
     parameters: Parameters, u: Array, r: Array, jacobian: Array, measured: Sequence[Measured]
 ) -> tuple[tuple[Estimate, ...], int]:
-    """Of each free number, and how many combinations of them the readings determine."""
+    """The estimate of each free number, and how many combinations of them the readings determine."""
     free = [parameters[name] for name in parameters.free]
     seen = np.linalg.norm(jacobian, axis=0) > _BLIND
     jacobian = jacobian * seen

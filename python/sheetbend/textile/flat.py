@@ -24,7 +24,7 @@ _HALVINGS = 40
 
 
 def turned(mesh: TriangleMesh, degrees: float) -> TriangleMesh:
-    """The same piece in the x-y plane, cut with its warp at an angle from x."""
+    """The same piece in the x-y plane, cut with its warp at an angle to x."""
     c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
     return TriangleMesh(mesh.vertices, mesh.triangles, mesh.vertices[:, :2] @ [[c, -s], [s, c]], mesh.sets)
 

@@ -150,7 +150,7 @@ def check_test(curve: Curve, test: str) -> None:
 
 
 def _sides(curve: Curve, cycle: int) -> list[Cycle]:
-    """That cycle of each side to which the test goes, positive first."""
+    """The chosen cycle of each side to which the test goes, the positive side first."""
     found = []
     for sign in (1.0, -1.0):
         own = [c for c in curve.cycles() if sign * float(c.loading.deformation[-1]) > 0.0]

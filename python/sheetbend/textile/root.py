@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
-from ..motion.equilibrium import NoEquilibriumError
+from ..errors import NoEquilibriumError
 
 _MOST = 60  # steps and halvings together
 _CLOSE = 1e-10  # of the measure, whose scale is 1

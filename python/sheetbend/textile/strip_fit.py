@@ -54,7 +54,7 @@ class Levels:
 
     @classmethod
     def of(cls, curves: Sequence[Curve], way: str, cycle: int, up_to: float | None) -> Levels:
-        """Of checked curves of tension; strains beyond `up_to` are left out.
+        """Levels of checked curves of tension; strains beyond `up_to` are left out.
 
         Raises:
             InputError: slack where levels are read off, or a strain that the curves do not reach.

@@ -56,7 +56,7 @@ class Column:
     unit: Unit | None
 
     def numbers(self) -> tuple[Array, list[int]]:
-        """As they stand, and their lines."""
+        """The numbers of the column as they are in the file, and their lines."""
         return self.table.column(self.index)
 
     def factor(self, allowed: Sequence[str]) -> float:
@@ -103,7 +103,7 @@ def find_columns(table: TextTable, role: str, dimensions: Sequence[str], choice:
 
 
 def needed_columns(table: TextTable, role: str, dimensions: Sequence[str], choice: Choice) -> list[Column]:
-    """The same, at least one.
+    """The columns of a role, at least one.
 
     Raises:
         RecordingError: there is none, or one of several cannot be told.

@@ -41,7 +41,7 @@ class Unit:
 
 
 def unit(text: str) -> Unit | None:
-    """None where the text is no unit known here. g and kg are taken for gram-force and kilogram-force."""
+    """The unit that a text names; None where it is unknown. g and kg are taken for gram-force and kilogram-force."""
     bare = text.strip().replace("µ", "u").replace("μ", "u").replace("⁻¹", "-1").replace("·", ".").replace("*", ".")
     for dimension, table in (("time", _TIMES), ("angle", _ANGLES), ("strain", _RATIOS)):
         if bare in table:

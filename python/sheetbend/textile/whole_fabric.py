@@ -115,7 +115,7 @@ def supported_law(tests: FabricTests) -> tuple[str, str]:
 
 
 def _expect_known(tests: FabricTests) -> None:
-    """Of the numbers that a fabric must have each is measured or given."""
+    """Check that each number that a fabric must have is measured or given."""
     told = {*tests.pulls, *tests.readings, *tests.given}
     sources = {
         "density": "weigh specimens ([weight])",
@@ -134,7 +134,7 @@ def _expect_known(tests: FabricTests) -> None:
 
 
 def _start(tests: FabricTests, law: str) -> tuple[Fabric, list[str]]:
-    """Where to begin, and the numbers that are free."""
+    """The fabric at which the fit begins, and the numbers that are free."""
     free: list[str] = []
     sizes: dict[str, Any] = dict(tests.given)
     laws: dict[str, Law] = {}

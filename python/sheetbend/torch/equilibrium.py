@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from .. import _core
-from ..errors import SceneError, refusal
-from ..motion.equilibrium import NoEquilibriumError, whole_start
-from ..motion.simulate import forces_by_group, pressures_by_volume
+from ..errors import NoEquilibriumError, SceneError, refusal
+from ..motion.core_terms import forces_by_group, pressures_by_volume
+from ..motion.equilibrium import whole_start
 from ..scene.scene import Scene
 from .function import respond
 from .inputs import InputMap

@@ -13,7 +13,7 @@ from torch import Tensor
 from .. import _core
 from ..errors import InputError
 from ..experiment.force_readings import read_at, readings_problem
-from ..motion.simulate import divergence
+from ..motion.core_terms import divergence
 from ..motion.solver import Solver
 from ..scene.scene import Scene
 

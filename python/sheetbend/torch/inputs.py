@@ -67,7 +67,7 @@ class ParameterMap:
 
 
 class InputMap:
-    """From tensors by name to flat inputs (*batch, total)."""
+    """The map from tensors by name to flat inputs (*batch, total)."""
 
     def __init__(self, scene: Scene) -> None:
         compiled = scene.compiled

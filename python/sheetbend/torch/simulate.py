@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from ..errors import InputError
+from ..motion.core_terms import substeps
 from ..motion.rollouts import Rollouts
-from ..motion.simulate import substeps
 from ..motion.solver import Solver
 from ..scene.scene import Scene
 from .function import respond

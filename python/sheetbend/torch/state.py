@@ -70,7 +70,7 @@ class State:
         return self.numbers[..., -_WHOLE].detach().to(torch.int64)
 
     def detach(self) -> State:
-        """The same state without what led to it: gradients stop here."""
+        """The same state, cut off from how it was computed: gradients stop here."""
         return State(self.numbers.detach(), self.dtype, self.hidden)
 
     def __getitem__(self, index: Any) -> State:

@@ -11,8 +11,8 @@ from torch import Tensor
 
 from .. import _core
 from ..errors import InputError
+from ..motion.core_terms import divergence
 from ..motion.rollouts import Rollouts
-from ..motion.simulate import divergence
 from ..motion.solver import Solver
 from ..scene.scene import Scene
 from .function import respond
@@ -161,7 +161,7 @@ class Stepper:
         return array.double(), array.shape[:dims]
 
     def _core(self, names: tuple[str, ...]) -> Core:
-        """Of substeps for which these arrays are given."""
+        """The compiled solver for substeps in which these arrays are given."""
         possible = [n for n in self._shapes if n not in ("position", "velocity")]
         for name in names:
             if name not in possible:
@@ -174,7 +174,8 @@ class Stepper:
         return core
 
     def _place(self, name: str) -> slice:
-        """Where an array stands in the inputs: of one over time its first knot, which then holds at all times."""
+        """The slice of an array in the inputs; of one over time that of its first knot, which then holds at all
+        times."""
         offset, _ = self._layout[name]
         return slice(offset, offset + torch.Size(self._shapes[name]).numel())
 

@@ -15,7 +15,7 @@ _MOST_AXES = 32
 
 
 class Array:
-    """In place of numpy.ndarray; empty until its state or its buffer comes."""
+    """Stands for numpy.ndarray in a pickle; empty until its state or its buffer comes."""
 
     __slots__ = ("values",)
 
@@ -41,7 +41,7 @@ class Array:
 
 
 class Number:
-    """In place of numpy.dtype: the type of a plain number."""
+    """Stands for numpy.dtype in a pickle: the type of a plain number."""
 
     __slots__ = ("dtype",)
 

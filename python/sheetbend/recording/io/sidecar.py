@@ -74,7 +74,7 @@ def write(recording: MarkerData, path: Path, assumed: tuple[str, ...] = ()) -> N
 
 
 def write_without_names(cloud: MarkerData, path: Path) -> None:
-    """The same beside a cloud, whose points have none."""
+    """Write the JSON beside a cloud, whose points have no names."""
     _write(cloud, path, {}, ())
 
 
@@ -123,7 +123,7 @@ def beside(path: Path) -> dict[str, Any]:
 
 
 def _name(path: Path, beside: dict[str, Any]) -> str:
-    """That of the JSON, else the file's stem."""
+    """The name in the JSON, otherwise the file's stem."""
     if "name" in beside:
         return checked_name(f"{path.with_suffix('.json')}: name", beside["name"])
     try:

@@ -1,4 +1,4 @@
-"""Fits that were written by `sheetbend fit`, read again to be compared."""
+"""Fits that `sheetbend fit` wrote, read from their folders so that they can be compared."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Parameters that stopped at a bound while the data ask for a value beyond it.
+"""Doubts about parameters beside one that stopped at a bound while the data ask for a value beyond it.
 
-The intervals of all other parameters take such a parameter as known. So these say nothing of where the others would go
-if it were free.
+The intervals of the other parameters take the bound as the true value, so they do not say where these parameters would
+go without it.
 """
 
 from __future__ import annotations
@@ -25,14 +25,15 @@ FAR = 0.5
 of 95 of 100 cases."""
 
 
-def pressed_to_bounds(problem: FitProblem, u: Array, judged: Identifiability) -> dict[str, str]:
-    """By parameter, that another one stopped at a bound, and how far this one would move without that bound.
+def beyond_bounds(problem: FitProblem, u: Array, judged: Identifiability) -> dict[str, str]:
+    """By parameter, which other one stopped at a bound, and how far this parameter would move without that bound.
 
-    Both follow from a Gauss-Newton step with the last Jacobian: no simulation is needed.
+    Both follow from a Gauss-Newton step with the last Jacobian, without a simulation.
 
     Args:
-        problem, u: and the point at which the fit ended.
-        judged: there.
+        problem: of the fit.
+        u: (free,) internal, the point at which the fit ended.
+        judged: verdicts and intervals there.
     """
     names = problem.parameters.free
     bounded = [e for e in judged.estimates if e.verdict == "at a bound" and _stopped(problem, e)]
@@ -61,7 +62,7 @@ def pressed_to_bounds(problem: FitProblem, u: Array, judged: Identifiability) ->
 
 
 def _stopped(problem: FitProblem, e: Estimate) -> bool:
-    """Whether a bound stopped it, not the end of what a search looks at, nor a limit of sums."""
+    """Whether a bound stopped the parameter, and not the end of the range of the search or a limit of sums."""
     parameter = problem.parameters[e.name]
     near = 1e-6 * max(abs(e.value), parameter.scale or 0.0)
     at_bound = min(e.value - parameter.lower, parameter.upper - e.value) <= near
@@ -69,12 +70,13 @@ def _stopped(problem: FitProblem, e: Estimate) -> bool:
 
 
 def _step(J: Array, r: Array) -> tuple[Array, float]:
-    """The Gauss-Newton step, and the cost that it leaves."""
+    """The Gauss-Newton step (columns,) of a Jacobian (rows, columns), and the cost that it leaves."""
     step = -solved(J, r)
     left = r + J @ step
     return step, 0.5 * float(left @ left)
 
 
 def _beyond(problem: FitProblem, u: Array, column: int, step: float) -> bool:
+    """Whether a step of a parameter at a bound goes beyond that bound."""
     lower, upper = (bound[column] for bound in problem.parameters.bounds())
     return math.isfinite(step) and (step < 0.0 if u[column] - lower < upper - u[column] else step > 0.0)

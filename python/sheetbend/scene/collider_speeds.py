@@ -1,4 +1,4 @@
-"""How fast colliders move: one that goes farther in a substep than it is thick may pass particles unseen."""
+"""Speeds of colliders: one that moves farther in a substep than it is thick may pass particles unseen."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 from .colliders import Collider
 from .contacts import Contacts
 
-CUBIC = 1.5  # of the mean speed between two knots, which a cubic that rests at both reaches
+CUBIC = 1.5  # the largest speed of a cubic that rests at two knots, over its mean speed between them
 
 
 @dataclass(frozen=True)
 class Fastest:
-    """A collider's surface at its fastest.
+    """The largest speed of a collider's surface.
 
     Attributes:
         name: of the collider.
@@ -29,7 +29,7 @@ class Fastest:
 
 
 def fastest(contacts: Contacts, radii: np.ndarray) -> tuple[Fastest, ...]:
-    """Of every collider that moves and can pass through particles, which a half space cannot.
+    """The largest speed of every collider that moves and can pass through particles, which a half space cannot.
 
     Args:
         radii: (contacts,) m.
@@ -44,6 +44,7 @@ def fastest(contacts: Contacts, radii: np.ndarray) -> tuple[Fastest, ...]:
 
 
 def _speed(collider: Collider) -> float:
+    """m/s, an upper bound of the speed of any point of the surface, its rotation included."""
     motion = collider.poses
     steps = np.diff(motion.times)
     along = np.linalg.norm(np.diff(motion.positions, axis=0), axis=1)
