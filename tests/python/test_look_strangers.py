@@ -515,7 +515,7 @@ def test_other_things_beside_a_rope(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     x, t = swinging(0.0), np.arange(301) / RATE
     x = x + np.random.default_rng(7).normal(0.0, NOISE, x.shape)
     box = np.add([0.8, 0.0, 0.5], [[0.0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]])
-    body = box + 0.1 * np.sin(3.0 * t)[:, None, None] * [1.0, 0.0, 0.0]
+    body = box + 0.2 * np.sin(3.0 * t)[:, None, None] * [1.0, 0.0, 0.0]
     ropes, boxes = ([f"{kind}{k}" for k in range(count)] for kind, count in (("r", 11), ("box", 4)))
     sb.Recording(np.concatenate([x, body], axis=1), t, [*ropes, *boxes], name="both").save("both.csv")
     sb.Recording(x, t, ropes, name="both").save("alone.csv")

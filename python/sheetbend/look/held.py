@@ -20,6 +20,7 @@ SMOOTHING, ALONE = 0.06, 0.12  # s, of recorded grips; of one that has one marke
 STIFF = 0.75  # of the next chord's: how much the direction at an end varies at most in a clamp; a pin has 1 or more
 NEAR = 1.5  # times the distance of neighbors on the rope: how near its first marker is to the second
 AWAY = 4.0  # times the distance of neighbors on the rope: a rigid body so far from all of them is not on it
+PARTS = 2.0  # of these distances: by so much that of such a body changes at least
 TURNS = 2.0  # times what it does move: how far a marker in a clamp would move if the rope turned there
 UNSURE = 0.6  # times the noise: so much motion cannot be told from it
 LEAST = 1e-4  # m, taken as the noise where there is less
@@ -79,12 +80,19 @@ def parts(s: Seen) -> tuple[tuple[int, ...], tuple[int, ...]]:
 
 
 def _away(s: Seen, body: tuple[int, ...]) -> bool:
-    """Whether a rigid body is far from every other marker, as one that no rope is fixed to."""
+    """Whether a rigid body is far from every other marker, at a distance that changes, as one that no rope is fixed
+    to."""
     others = [k for k in range(len(s.recording.markers)) if k not in body]
     if len(others) < 3:
         return False
     spacing = float(np.median(np.sort(s.apart[np.ix_(others, others)], axis=1)[:, 1]))
-    return float(s.apart[np.ix_(body, others)].min()) > AWAY * spacing
+    beside = s.apart[np.ix_(body, others)]
+    if beside.min() <= AWAY * spacing:
+        return False
+    i, j = np.unravel_index(int(beside.argmin()), beside.shape)
+    x = s.recording.positions
+    distance = np.linalg.norm(x[:, body[i]] - x[:, others[j]], axis=1)
+    return float(np.nanmax(distance) - np.nanmin(distance)) > PARTS * spacing
 
 
 def _slack(s: Seen, a: int, b: int) -> float:
