@@ -515,7 +515,7 @@ def test_other_things_beside_a_rope(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     x, t = swinging(0.0), np.arange(301) / RATE
     x = x + np.random.default_rng(7).normal(0.0, NOISE, x.shape)
     box = np.add([0.8, 0.0, 0.5], [[0.0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]])
-    body = box + 0.1 * np.sin(3.0 * t)[:, None, None] * [1.0, 0.0, 0.0]
+    body = box + 0.2 * np.sin(3.0 * t)[:, None, None] * [1.0, 0.0, 0.0]
     ropes, boxes = ([f"{kind}{k}" for k in range(count)] for kind, count in (("r", 11), ("box", 4)))
     sb.Recording(np.concatenate([x, body], axis=1), t, [*ropes, *boxes], name="both").save("both.csv")
     sb.Recording(x, t, ropes, name="both").save("alone.csv")
@@ -542,3 +542,28 @@ def test_a_rope_that_is_let_go(tmp_path: Path) -> None:
     assert any("it falls freely from 2.1" in s or "it falls freely from 2.2" in s for s in found.seen)
     whole, _ = drafted(tmp_path, swinging(0.0))
     assert not any("falls freely" in s for s in whole.seen)
+
+
+def test_a_rope_between_two_rigid_bodies(tmp_path: Path) -> None:
+    """The second body's markers were taken for markers on the rope, and the rope's end for a free one."""
+    t = np.arange(301) / RATE
+    s = np.linspace(0.0, 1.0, 11)[1:-1]
+    first = np.stack([0.05 * np.sin(4 * t), 0.05 * np.sin(3 * t), 1 + 0.03 * np.sin(5 * t)], axis=1)
+    last = np.stack([0.7 + 0.04 * np.sin(3.3 * t), 0.06 * np.sin(2 * t), 1 + 0.05 * np.sin(4.4 * t)], axis=1)
+    apart = np.linalg.norm(last - first, axis=1)
+    rope = first[:, None] * (1 - s)[:, None] + last[:, None] * s[:, None]
+    rope[:, :, 2] -= 4 * np.sqrt(0.375 * apart * (0.95 - apart))[:, None] * s * (1 - s)
+    rope[:, :, 1] += 0.05 * np.sin(6 * t)[:, None] * np.sin(np.pi * s)
+    turned = np.array([[0.0, 0.03, 0.02], [-0.02, -0.03, 0.01], [-0.03, 0.0, 0.03]])
+    tilt = 0.15 * np.sin(4 * t)[:, None]
+    body = np.stack(
+        [0 * tilt + turned[:, 0], turned[:, 1] - tilt * turned[:, 2], turned[:, 2] + tilt * turned[:, 1]], 2
+    )
+    found, content = drafted(tmp_path, np.concatenate([first[:, None] + body, rope, last[:, None] + body], axis=1))
+    (held,) = content["scene"].get("rope", content["scene"].get("rod"))
+    assert [(g["at"], g["markers"]) for g in held["grip"]] == [
+        ("start", ["m0", "m1", "m2"]),
+        ("end", ["m12", "m13", "m14"]),
+    ]
+    assert list(held["markers"]) == [f"m{k}" for k in range(3, 12)]
+    assert sum("move as one rigid body, which holds the rope" in sentence for sentence in found.seen) == 2

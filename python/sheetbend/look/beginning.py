@@ -6,8 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..arrays.timeseries import mean_position
 from .seen import Seen
 
+QUIET = 0.6  # of the rest, in which nothing moves yet: its end is where the motion exceeds the noise
 EARLY = 0.05  # s, in which the speed at the first frame is looked for
 
 
@@ -24,3 +26,15 @@ def lets_go(s: Seen, order: Sequence[int]) -> bool:
         return False
     slope = np.linalg.lstsq(np.vander(t[early], 3, increasing=True), x.reshape(len(early), -1), rcond=None)[0][1]
     return bool(np.abs(slope).max() < 4.0 * s.noise * np.sqrt(192 / len(early)) / t[early[-1]])
+
+
+def quiet_frame(s: Seen, markers: Sequence[int]) -> float:
+    """s, of the frame at rest in which markers are nearest to their mean places there; the first one's without a rest.
+
+    A model begins with its rope below the marker that holds it, where the first fitted frame shows this marker. Noise
+    in that frame moves the whole rope, which then swings, and the fit explains the swing by a motion of the hand.
+    """
+    t = s.recording.times
+    x = s.recording.positions[t <= t[0] + QUIET * s.rest][:, list(markers)]
+    off = np.linalg.norm(x - mean_position(x), axis=2).max(axis=1)
+    return float(t[0] if np.isnan(off).all() else t[int(np.nanargmin(off))])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -20,6 +21,7 @@ SMOOTHING, ALONE = 0.06, 0.12  # s, of recorded grips; of one that has one marke
 STIFF = 0.75  # of the next chord's: how much the direction at an end varies at most in a clamp; a pin has 1 or more
 NEAR = 1.5  # times the distance of neighbors on the rope: how near its first marker is to the second
 AWAY = 4.0  # times the distance of neighbors on the rope: a rigid body so far from all of them is not on it
+PARTS = 2.0  # of these distances: by so much that of such a body changes at least
 TURNS = 2.0  # times what it does move: how far a marker in a clamp would move if the rope turned there
 UNSURE = 0.6  # times the noise: so much motion cannot be told from it
 LEAST = 1e-4  # m, taken as the noise where there is less
@@ -37,7 +39,7 @@ class Held:
         grips: tables of its grips.
         angles: ends whose clamps may turn by an angle that is fitted.
         alone: names of markers that move an end, which turns there.
-        lead: m, from what holds the rope to the marker next to it.
+        leads: m, by end, from what holds the rope to the marker next to it.
         priors: standard deviations of the rope's quantities that say how a hand holds it; zero is expected.
         notes, unknown: sentences about what is seen, and what is not known.
     """
@@ -47,21 +49,50 @@ class Held:
     grips: list[dict[str, Any]] = field(default_factory=list)
     angles: list[str] = field(default_factory=list)
     alone: list[str] = field(default_factory=list)
-    lead: float = 0.0
+    leads: dict[str, float] = field(default_factory=dict)
     priors: dict[str, float] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     unknown: list[str] = field(default_factory=list)
 
 
-def parts(s: Seen) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Markers of the hand's rigid body, and those of the rope in order."""
+Hands = tuple[tuple[int, ...], ...]
+"""Markers of the rigid bodies that hold a rope: none, one, or one at each end."""
+
+
+def parts(s: Seen) -> tuple[Hands, tuple[int, ...]]:
+    """Markers of the hands' rigid bodies, and those of the rope in order."""
     count = len(s.recording.markers)
     known = named(s)
     away = {k for b in s.bodies if not known & set(b) and _away(s, b) for k in b}
     near_rope = [b for b in s.bodies if not away & set(b)]
     hands = [b for b in near_rope if known & set(b)] or [b for b in near_rope if count - len(away) - len(b) >= 3]
-    hand = hands[0] if hands else ()
-    order = chain(s.apart, tuple(k for k in range(count) if k not in hand and k not in away))
+    chosen = _at_the_ends(s, hands, away)
+    order = _rest(s, chosen, away)
+    for i, hand in enumerate(chosen):
+        chosen[i], order = _with_own(s, hand, order)
+    return tuple(chosen), order
+
+
+def _rest(s: Seen, hands: Sequence[tuple[int, ...]], away: set[int]) -> tuple[int, ...]:
+    """The markers of the rope in order."""
+    left = set(range(len(s.recording.markers))) - away - {k for hand in hands for k in hand}
+    return chain(s.apart, tuple(sorted(left)))
+
+
+def _at_the_ends(s: Seen, bodies: Sequence[tuple[int, ...]], away: set[int]) -> list[tuple[int, ...]]:
+    """The first body, and another one that is nearer to the other end of the rope."""
+    for other in bodies[1:]:
+        pair = [bodies[0], other]
+        order = _rest(s, pair, away)
+        if len(order) >= 3:
+            near = [int(np.argmin([s.apart[list(body), end].min() for end in (order[0], order[-1])])) for body in pair]
+            if near[0] != near[1]:
+                return pair
+    return list(bodies[:1])
+
+
+def _with_own(s: Seen, hand: tuple[int, ...], order: tuple[int, ...]) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """A hand and the rope, where one of the hand's markers may be the rope's own."""
     if len(hand) <= 3 or len(order) < 3:
         return hand, order
     # the rope's own first marker keeps its place in the hand too
@@ -79,12 +110,19 @@ def parts(s: Seen) -> tuple[tuple[int, ...], tuple[int, ...]]:
 
 
 def _away(s: Seen, body: tuple[int, ...]) -> bool:
-    """Whether a rigid body is far from every other marker, as one that no rope is fixed to."""
+    """Whether a rigid body is far from every other marker, at a distance that changes, as one that no rope is fixed
+    to."""
     others = [k for k in range(len(s.recording.markers)) if k not in body]
     if len(others) < 3:
         return False
     spacing = float(np.median(np.sort(s.apart[np.ix_(others, others)], axis=1)[:, 1]))
-    return float(s.apart[np.ix_(body, others)].min()) > AWAY * spacing
+    beside = s.apart[np.ix_(body, others)]
+    if beside.min() <= AWAY * spacing:
+        return False
+    i, j = np.unravel_index(int(beside.argmin()), beside.shape)
+    x = s.recording.positions
+    distance = np.linalg.norm(x[:, body[i]] - x[:, others[j]], axis=1)
+    return float(np.nanmax(distance) - np.nanmin(distance)) > PARTS * spacing
 
 
 def _slack(s: Seen, a: int, b: int) -> float:
@@ -103,17 +141,18 @@ def gripping(s: Seen) -> set[int]:
     return named(s) | set(s.recording.clamped)
 
 
-def held(s: Seen, hand: tuple[int, ...], order: tuple[int, ...]) -> Held:
+def held(s: Seen, hands: Hands, order: tuple[int, ...]) -> Held:
     """What holds a rope that moves, whose markers are given in order."""
     r = s.recording
     names, still, clamped = r.markers, set(s.still), gripping(s)
     found = Held(order)
     ends = {"start": order[0], "end": order[-1]}
     taken = [at for at, k in ends.items() if k in still or k in clamped]
-    if hand:
-        by_hand = _of_hand(s, hand, found)
-        taken = [at for at in taken if at != by_hand]
-    elif not taken:
+    by_hand: list[str] = []
+    for hand in hands:
+        by_hand.append(_of_hand(s, hand, found, by_hand))
+    taken = [at for at in taken if at not in by_hand]
+    if not taken and not by_hand:
         taken = [_guessed(s, found)]
     for at in taken:
         k, way = ends[at], order if at == "start" else order[::-1]
@@ -194,12 +233,14 @@ def _clamp_angles(s: Seen, found: Held) -> None:
         found.unknown.append(f"the exact direction of the clamp, which the first markers show poorly: {kept}")
 
 
-def _of_hand(s: Seen, hand: tuple[int, ...], found: Held) -> str:
-    """Add the grip of a hand's body; returns the end that it holds."""
+def _of_hand(s: Seen, hand: tuple[int, ...], found: Held, held_before: Sequence[str]) -> str:
+    """Add the grip of a hand's body; returns the end that it holds, which none held before."""
     r, order = s.recording, found.order
     center = np.nanmean(r.positions[:, list(hand)], axis=1)
     reach = [float(np.nanmean(np.linalg.norm(r.positions[:, k] - center, axis=1))) for k in (order[0], order[-1])]
     at, k = ("start", order[0]) if reach[0] <= reach[1] else ("end", order[-1])
+    if at in held_before:
+        at, k = ("end", order[-1]) if at == "start" else ("start", order[0])
     name, all_of = r.markers[k], joined(r.markers[j] for j in hand)
     where = entry(s, hand, order if at == "start" else order[::-1])
     grip: dict[str, Any] = {"at": at, "markers": [r.markers[j] for j in hand], "position": where.place}
@@ -210,7 +251,7 @@ def _of_hand(s: Seen, hand: tuple[int, ...], found: Held) -> str:
             f"m from {name}. Both are fitted: the whole rope is rope_length + rope_{at}_lead long. Measure the length "
             "from the hand to that marker, and give it as `lead` with a narrower prior"
         )
-        found.lead, grip["lead"] = where.lead, where.lead
+        found.leads[at] = grip["lead"] = where.lead
         found.rope |= {"tilts": True, "shifts": True}
         found.priors |= {f"{at}_tilt_{j}": TILT_SD for j in (1, 2)}
         found.priors |= {f"{at}_shift_{j}": SHIFT_SD * where.lead for j in (1, 2)}

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import RecordingError
-from .held import Held, parts
+from .held import Hands, Held, parts
 from .seen import Seen
 from .take import Take
 from .text import joined, table
@@ -55,12 +55,12 @@ class Marked:
 
 
 def marked_by(
-    takes: Sequence[Take], found: Held, holding: Callable[[Seen, tuple[int, ...], tuple[int, ...]], Held]
+    takes: Sequence[Take], found: Held, holding: Callable[[Seen, Hands, tuple[int, ...]], Held]
 ) -> list[Marked]:
     """The markers of each recording; those of the first one are held as found.
 
     Args:
-        holding: from a recording, the markers of its hand and those on the rope in order to what holds it.
+        holding: from a recording, the markers of its hands and those on the rope in order to what holds it.
 
     Raises:
         RecordingError: one shows no rope, or one that is held otherwise than the first one's.
@@ -105,17 +105,15 @@ def _alike(first: Take, take: Take, order: tuple[int, ...]) -> bool:
     return a.static or bool(np.all(np.abs(chords[1] - chords[0]) < most))
 
 
-def _held_alike(
-    first: Take, take: Take, found: Held, holding: Callable[[Seen, tuple[int, ...], tuple[int, ...]], Held]
-) -> Held:
+def _held_alike(first: Take, take: Take, found: Held, holding: Callable[[Seen, Hands, tuple[int, ...]], Held]) -> Held:
     """What holds the rope in a further recording, its markers from the same end as in the first one."""
-    hand, order = parts(take.seen)
+    hands, order = parts(take.seen)
     if take.seen.static == first.seen.static and len(order) >= 3:
         for way in (order, order[::-1]):
-            own = holding(take.seen, hand, way)
+            own = holding(take.seen, hands, way)
             if _way(own) == _way(found):
-                leads = [{**grip, "lead": found.lead} if found.lead else grip for grip in own.grips]
-                return replace(own, lead=found.lead, grips=leads)
+                leads = [grip | ({"lead": found.leads[grip["at"]]} if "lead" in grip else {}) for grip in own.grips]
+                return replace(own, leads=found.leads, grips=leads)
     fix = "make one configuration for each"
     raise RecordingError("markers", f"of {take.file} show no rope that is held as in {first.file}", take.file, fix)
 
@@ -123,7 +121,7 @@ def _held_alike(
 def _way(held: Held) -> tuple[Any, ...]:
     """What decides about the model of a held rope."""
     grips = [(grip["at"], min(len(grip["markers"]), 3), "direction" in grip) for grip in held.grips]
-    return sorted(grips), sorted(held.rope), held.rope.get("pinned"), bool(held.lead)
+    return sorted(grips), sorted(held.rope), held.rope.get("pinned"), sorted(held.leads)
 
 
 def _arcs(takes: Sequence[Take], found: Held) -> Array:
@@ -135,5 +133,4 @@ def _arcs(takes: Sequence[Take], found: Held) -> Array:
         even = float(np.median(chords))
         if len(chords) >= 4 and np.all(np.abs(chords - even) < 2.0 * noise):
             chords = np.full(len(chords), even)  # all alike within their noise: the median is closer
-    lead = found.lead if found.grips and found.grips[0]["at"] == "start" else 0.0
-    return lead + np.concatenate([[0.0], np.cumsum(chords)])
+    return found.leads.get("start", 0.0) + np.concatenate([[0.0], np.cumsum(chords)])

@@ -10,9 +10,9 @@ import numpy as np
 
 from ..arrays.timeseries import mean_position
 from ..errors import RecordingError
-from .beginning import lets_go
+from .beginning import lets_go, quiet_frame
 from .end_load import loaded_end
-from .held import Held, gripping, held, parts
+from .held import Hands, Held, gripping, held, parts
 from .line import plane, snapped, tangent
 from .marked import Marked, marked_by, said_of
 from .one_rope import check_one_rope
@@ -62,7 +62,8 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     """A rope; None where fewer than three markers are in a line."""
     s = takes[0].seen
     r = s.recording
-    hand, order = parts(s)
+    hands, order = parts(s)
+    hand = tuple(k for body in hands for k in body)
     if len(order) < 3:
         return None
     if len(hand) + len(order) < len(r.markers):
@@ -70,7 +71,7 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     if not s.static and len(takes) == 1 and (let_go := released(s, order)) is not None:
         return _while_held(takes[0], measured, let_go)
     check_one_rope(s, order)
-    found = _holding(s, hand, order)
+    found = _holding(s, hands, order)
     if len(found.order) < 3:
         return None
     pushed = None
@@ -80,8 +81,8 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     marked = marked_by(takes, found, _holding)
     longest = max(marked, key=lambda own: own.arcs[-1])
     length, measured_length, said_length = _length(s, longest, measured)
-    if not measured_length and found.grips and found.grips[0]["at"] == "end":
-        length += found.lead
+    if not measured_length:
+        length += found.leads.get("end", 0.0)
     density, said_density = _density(s, measured)
     names = r.markers
     far = f"{min(marked[0].arcs[-1], length):.4g} m"
@@ -137,9 +138,12 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         take, r = here.take, here.take.seen.recording
         own = _recording(take, flat, "points" in rope) | {"driven_sigma": "estimate" if estimated else None}
         driving = [r.markers.index(name) for grip in here.held.grips for name in grip["markers"]]
+        if estimated:
+            own["fit"][0] = quiet_frame(take.seen, driving)
         own["max_gap"] = max_gap(r.times, r.mask[:, driving])
         why = {
             "driven_sigma": "the fit estimates the hand's true motion",
+            "fit": "begins where noise moves the hand's marker least from its place at rest" if estimated else "",
             "held_out": "predicted, not fitted",
             "max_gap": "s, for which a marker of a grip is lost: closed by a cubic",
         }
@@ -206,8 +210,8 @@ def _free(take: Take, found: Held) -> tuple[list[Take], str | None]:
     return [replace(take, seen=replace(s, recording=r.piece(start), rest=0.0))], said
 
 
-def _holding(s: Seen, hand: tuple[int, ...], order: tuple[int, ...]) -> Held:
-    return _at_rest(s, order) if s.static else held(s, hand, order)
+def _holding(s: Seen, hands: Hands, order: tuple[int, ...]) -> Held:
+    return _at_rest(s, order) if s.static else held(s, hands, order)
 
 
 def _at_rest(s: Seen, order: tuple[int, ...]) -> Held:
@@ -297,7 +301,7 @@ def _without_spin(s: Seen, found: Held) -> dict[str, Any]:
 def _can_be_rod(s: Seen, found: Held) -> bool:
     """Whether a rod can be held like this. One that turns freely has no single rest, since it may also turn about its
     own axis; so it must hang straight there, from its start."""
-    if found.lead:
+    if found.leads:
         return False
     from_start = [grip["at"] for grip in found.grips] == ["start"] and not found.rope.get("pinned")
     return not (s.rest and _turns_freely(found)) or (from_start and _straight(s, found.order) is not None)
