@@ -1,4 +1,4 @@
-// An experiment at one correction b of its boundary, with the derivatives of its residuals by b.
+// An experiment at one correction b, with the derivatives of its residuals by b.
 #pragma once
 
 #include <memory>
@@ -11,7 +11,7 @@ namespace sheetbend {
 
 class Corrected {
  public:
-  // b [m] has correction.count() numbers. Throws as Experiment::residuals does.
+  // b has correction.count() numbers in their units. Throws as Experiment::residuals does.
   static std::unique_ptr<Corrected> at(const Experiment& e, const double* theta, const double* b, Interrupt* interrupt);
   virtual ~Corrected() = default;
 

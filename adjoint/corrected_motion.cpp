@@ -59,6 +59,9 @@ CorrectedMotion::CorrectedMotion(const Experiment& e, const double* theta, const
   if (e.start == Start::equilibrium) {
     rest_ = e.anchor->solve(scene, inputs_.data(), e.equilibrium, interrupt);
     std::copy(rest_->x.begin(), rest_->x.end(), &start_[scene.layout.of(Quantity::position)]);
+  } else if (e.start == Start::settled) {
+    settled_.emplace(scene, *e.settling, inputs_.data(), e.t0);
+    std::copy(settled_->x().begin(), settled_->x().end(), &start_[scene.layout.of(Quantity::position)]);
   }
   const std::vector<int> every = up_to(last_);
   states_.resize(every.size() * dofs);
@@ -91,22 +94,28 @@ std::vector<double> CorrectedMotion::gradient(Interrupt* interrupt) {
   }
   reverse_rollout(scene, e_.plan, start_.data(), e_.t0, *tape_, up_to(last_), x_bar.data(), inputs_bar.data(),
                   interrupt);
-  if (rest_) {
+  if (rest_ || settled_) {
     const auto at = inputs_bar.begin() + static_cast<std::ptrdiff_t>(scene.layout.of(Quantity::position));
-    const std::vector<double> rest_bar(at, at + static_cast<std::ptrdiff_t>(dofs));
-    EquilibriumDerivative(scene, inputs_.data(), *rest_).vjp(rest_bar.data(), nullptr, inputs_bar.data());
+    const std::vector<double> start_bar(at, at + static_cast<std::ptrdiff_t>(dofs));
+    if (rest_) EquilibriumDerivative(scene, inputs_.data(), *rest_).vjp(start_bar.data(), nullptr, inputs_bar.data());
+    if (settled_) {  // which these places alone make
+      std::fill_n(at, dofs, 0.0);
+      settled_->pull_back(start_bar.data(), inputs_bar.data());
+    }
   }
   std::vector<double> b_bar(e_.correction.count());
   e_.correction.pull_back(inputs_bar.data(), b_bar.data());
   return b_bar;
 }
 
-// A knot reaches over one piece of the boundary's motion on either side, or two; the end values hold before and after.
+// A knot reaches over one piece of the boundary's motion on either side, or two; the end values hold before and after. What the motion starts with
+// acts at its start alone.
 CorrectedMotion::Acts CorrectedMotion::acts(int number) const {
   const Scene& scene = *e_.scene;
-  const BoundaryCorrection& c = e_.correction;
+  const Estimated& c = e_.correction;
   const auto begin = c.target.begin() + c.first[number], end = c.target.begin() + c.first[number + 1];
   if (begin == end) return {last_, 0};  // it moves nothing
+  if (*std::min_element(begin, end) < static_cast<int>(scene.layout.of(Quantity::boundary))) return {0, 0};
   const auto knot = [&](int target) {
     return (target - static_cast<int>(scene.layout.of(Quantity::boundary))) /
            (3 * static_cast<int>(scene.driven.size()));
@@ -124,7 +133,7 @@ CorrectedMotion::Acts CorrectedMotion::acts(int number) const {
 
 // A stretch begins three substeps before its first number does, so that every frame that is moved has its four states in it.
 std::vector<CorrectedMotion::Stretch> CorrectedMotion::stretches() const {
-  const int count = e_.correction.count();
+  const int count = e_.correction.unknowns();
   std::vector<int> order(count), from(count), until(count);
   for (int i = 0; i < count; ++i) {
     const Acts a = acts(i);
@@ -160,7 +169,7 @@ std::vector<CorrectedMotion::Stretch> CorrectedMotion::stretches() const {
 }
 
 Response CorrectedMotion::response(double tolerance, int threads, Interrupt* interrupt) const {
-  Response found{static_cast<int>(residuals_.size()), e_.correction.count(), {}};
+  Response found{static_cast<int>(residuals_.size()), e_.correction.unknowns(), {}};
   const std::vector<Stretch> all = stretches();
   const double time = last_ * e_.plan.options.h / static_cast<double>(std::max<std::size_t>(all.size(), 1));
   const double place = *std::min_element(e_.observed.sigma.begin(), e_.observed.sigma.end());
@@ -203,13 +212,18 @@ void CorrectedMotion::march(const Stretch& s, const Unit& unit, const MatrixXd& 
   each_brought([&](int k, const auto& direction) {
     for (std::size_t i = 0; i < s.acting.size(); ++i) b[s.acting[i]].d[k] = unit.place * direction[4 * dofs + i];
   });
-  for (int k = std::max(0, brought - first); k < width; ++k)
-    b[s.numbers[first + k - brought]].d[k] = e_.correction.sigma;
+  for (int k = std::max(0, brought - first); k < width; ++k) {
+    const int number = s.numbers[first + k - brought];
+    b[number].d[k] = e_.correction.sigma[number];
+  }
   for (const auto* numbers : {&s.acting, &s.numbers})
     for (const int i : *numbers)
       e_.correction.apply(i, b[i], in.data());  // of value zero: they are in the inputs already
   if (from == 0 && rest_) {
     const auto x = equilibrium_coordinates<Eight>(scene, in.data(), e_.equilibrium, *e_.anchor, interrupt);
+    std::copy(x.begin(), x.end(), &in[scene.layout.of(Quantity::position)]);
+  } else if (from == 0 && settled_) {
+    const auto x = settled_coordinates<Eight>(scene, *e_.settling, in.data(), e_.t0);
     std::copy(x.begin(), x.end(), &in[scene.layout.of(Quantity::position)]);
   }
   Rollout<Eight> rollout(scene, e_.plan, in.data(), e_.t0);

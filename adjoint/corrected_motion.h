@@ -1,4 +1,4 @@
-// A motion at one correction of its boundary. The gradient is one adjoint. The response is made of tangents, eight at a time, from segment to segment: the
+// A motion at one correction. The gradient is one adjoint. The response is made of tangents, eight at a time, from segment to segment: the
 // state that they have reached together is put in an orthonormal basis (QR with column pivoting), and only its directions go on, however many numbers
 // came before (as in reduced-rank square root filters: Verlaan & Heemink 1997).
 #pragma once
@@ -7,6 +7,7 @@
 
 #include "adjoint/corrected.h"
 #include "adjoint/rollout.h"
+#include "adjoint/settled.h"
 
 namespace sheetbend {
 
@@ -40,10 +41,11 @@ class CorrectedMotion : public Corrected {
              Eigen::MatrixXd& G, Eigen::MatrixXd& reached, Interrupt* interrupt) const;
 
   int last_;
-  std::vector<double> start_;  // the inputs with the equilibrium that the motion starts at
+  std::vector<double> start_;  // the inputs with the equilibrium or the settled places that the motion starts at
   std::vector<double> states_;
   std::vector<std::size_t> first_row_;  // of each frame
   std::optional<Equilibrium> rest_;
+  std::optional<Settled> settled_;
   std::optional<Tape<double>> tape_;
 };
 

@@ -26,7 +26,7 @@ std::vector<double> CorrectedRest::gradient(Interrupt*) {
 // There is nothing to leave out: one segment.
 Response CorrectedRest::response(double, int threads, Interrupt* interrupt) const {
   using Eight = Dual<double, 8>;
-  const int count = e_.correction.count(), rows = static_cast<int>(residuals_.size());
+  const int count = e_.correction.unknowns(), rows = static_cast<int>(residuals_.size());
   Response found{rows, count, {}};
   Response::Segment& all = found.segments.emplace_back();
   all.numbers.resize(count);
@@ -40,7 +40,7 @@ Response CorrectedRest::response(double, int threads, Interrupt* interrupt) cons
       std::vector<Eight> in(inputs_.begin(), inputs_.end()), x(x_.size()), r(rows);
       for (int k = 0; k < width; ++k) {
         Eight b;
-        b.d[k] = e_.correction.sigma;
+        b.d[k] = e_.correction.sigma[first + k];
         e_.correction.apply(first + k, b, in.data());
       }
       derivative_->jvp(in.data(), x.data(), static_cast<Eight*>(nullptr));

@@ -1,4 +1,4 @@
-// An equilibrium at one correction of its boundary.
+// An equilibrium at one correction.
 #pragma once
 
 #include <optional>

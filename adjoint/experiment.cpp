@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "adjoint/observation.h"
+#include "adjoint/settled.h"
 #include "core/scalar/dual.h"
 
 namespace sheetbend {
@@ -51,18 +52,22 @@ void Experiment::check() const {
       (observed.is_cloud() ? 0 : columns) != observed.markers.size())
     throw std::invalid_argument(name + ": measured and sigma must be (frames, markers, 3) and (frames, markers)");
   if (observed.is_cloud() && correction.unknowns() > 0)
-    throw std::invalid_argument(name + ": a cloud does not go with corrected markers");
+    throw std::invalid_argument(name + ": a cloud does not go with an estimated start or corrected markers");
   if (is_static && frames != 1)
     throw std::invalid_argument(name + ": an equilibrium has one frame. Fix: give each shape as a recording");
   if (least.size() != most.size() || (!least.empty() && least.size() != scene->layout.total()))
     throw std::invalid_argument(name + ": the ranges do not fit the scene");
   if (map.base.size() != inputs()) throw std::invalid_argument(name + ": the parameter map does not fit the scene");
-  if (correction.first.size() != correction.given.size() + 1)
+  if (correction.first.size() != correction.given.size() + 1 || correction.sigma.size() != correction.given.size())
     throw std::invalid_argument(name + ": the correction does not fit its own numbers");
+  if (std::any_of(correction.sigma.begin() + correction.unknowns(), correction.sigma.end(),
+                  [](double sigma) { return sigma != 0.0; }))
+    throw std::invalid_argument(name + ": numbers that are estimated come before those that are not");
   if (is_static && !sensors.empty())
     throw std::invalid_argument(name + ": force sensors are read along motions, not at rest");
   if (correction.unknowns() > 0 && !sensors.empty())
-    throw std::invalid_argument(name + ": driven markers are not corrected beside force sensors. Fix: leave out one");
+    throw std::invalid_argument(
+        name + ": neither a start nor driven markers are estimated beside force sensors. Fix: leave out one");
   for (const ForceSensor& sensor : sensors)
     if (sensor.measured.size() % ForceSensor::channels != 0 || sensor.rotation.size() != 9 * sensor.samples() ||
         sensor.times.size() != sensor.sample.size() || sensor.times.size() != sensor.share.size() ||
@@ -70,8 +75,8 @@ void Experiment::check() const {
       throw std::invalid_argument(name + ": the arrays of a force sensor do not fit each other");
   if (residual_count() == 0) throw std::invalid_argument(name + ": every marker is missing in every frame");
   if (!finer.empty() && correction.unknowns() > 0)
-    throw std::invalid_argument(name +
-                                ": driven markers are not corrected under extrapolation in time. Fix: leave out one");
+    throw std::invalid_argument(
+        name + ": neither a start nor driven markers are estimated under extrapolation in time. Fix: leave out one");
 }
 
 template <class T, class Frame>
@@ -156,6 +161,9 @@ void Experiment::residuals(const T* theta, const T* b, T* r, T* simulated, T* se
       frame_residuals(observed, 0, x.data(), offsets, r, simulated);
       return;
     }
+    std::copy(x.begin(), x.end(), in.begin() + static_cast<std::ptrdiff_t>(scene->layout.of(Quantity::position)));
+  } else if (start == Start::settled) {
+    const std::vector<T> x = settled_coordinates(*scene, *settling, in.data(), t0);
     std::copy(x.begin(), x.end(), in.begin() + static_cast<std::ptrdiff_t>(scene->layout.of(Quantity::position)));
   }
 

@@ -2,13 +2,14 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
-#include "adjoint/boundary_correction.h"
 #include "adjoint/cloud.h"
 #include "adjoint/equilibrium_tangents.h"
+#include "adjoint/estimated.h"
 #include "adjoint/force_sensor.h"
 #include "adjoint/markers.h"
 #include "adjoint/parameter_map.h"
@@ -16,7 +17,7 @@
 
 namespace sheetbend {
 
-enum class Start : int { given, equilibrium };  // where a motion starts
+enum class Start : int { given, equilibrium, settled };  // where a motion starts
 enum class Loss : int { squares, soft_l1, huber, cauchy };
 
 // Either markers, or the points of a cloud: then there are no markers but a surface, and a column holds another point in every frame.
@@ -54,12 +55,13 @@ struct Experiment {
   std::string name;
   std::shared_ptr<const Scene> scene;
   Plan plan;
-  std::vector<FinerRun> finer;  // predicted markers are their weighted sum; those of `plan` weigh the rest up to 1
+  std::optional<Plan> settling;  // of a start that settles (settled.h)
+  std::vector<FinerRun> finer;   // predicted markers are their weighted sum; those of `plan` weigh the rest up to 1
   ParameterMap map;
   std::vector<double> least, most;  // of the scene's inputs
   Observations observed;
   std::vector<ForceSensor> sensors;
-  BoundaryCorrection correction;
+  Estimated correction;
   bool is_static = false;  // the recording shows an equilibrium
   Start start = Start::given;
   double t0 = 0.0;

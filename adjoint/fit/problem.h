@@ -31,11 +31,11 @@ class Problem {
   const std::vector<int>& first_rows() const { return first_row_; }  // of each experiment, and one past the last
 
   // residual (rows), jacobian (rows x parameters, row-major) or null: rows of data, of the parameters' priors, of the corrections' priors.
-  // Corrections of boundaries are solved for at every u, so that all depend on u alone (projection.h). Returns false, with `failure` saying
+  // Corrections are solved for at every u, so that all depend on u alone (projection.h). Returns false, with `failure` saying
   // why, where the physics has no answer (divergence, no equilibrium).
   bool evaluate(const double* u, double* residual, double* jacobian, Interrupt* interrupt) const;
 
-  // Simulated markers (frames, markers, 3) of one experiment, its boundary corrected as it was in the last evaluation.
+  // Simulated markers (frames, markers, 3) of one experiment, corrected as it was in the last evaluation.
   std::vector<double> simulate(int experiment, const double* u, Interrupt* interrupt) const;
 
   // What the force sensors of one experiment read, likewise: (samples, 6) of one after the other.
@@ -49,7 +49,7 @@ class Problem {
   // their last linearization, after an evaluation.
   std::vector<double> reduced(const double* change) const;
 
-  // The correction [m] of an experiment in the last evaluation, or as given where none is estimated.
+  // The correction, in its units, of an experiment in the last evaluation, or as given where none is estimated.
   const std::vector<double>& correction(int experiment) const;
 
   // What the correction of an experiment absorbs of its data's degrees of freedom, as last linearized; 0 where none is estimated.

@@ -22,7 +22,8 @@ double sum_of_squares(const std::vector<double>& a) { return std::inner_product(
 
 Projection::Projection(const Experiment& e, int parameters, int threads)
     : e_(&e), parameters_(parameters), threads_(threads), given_(e.correction.given) {
-  b_ = Eigen::Map<const Eigen::VectorXd>(given_.data(), unknowns()) / e.correction.sigma;
+  b_.resize(unknowns());
+  for (int i = 0; i < unknowns(); ++i) b_[i] = given_[i] / e.correction.sigma[i];
 }
 
 void Projection::linearize(const Corrected& here, Place place, double damping, Interrupt* interrupt) {
@@ -46,11 +47,12 @@ void Projection::renew(Interrupt* interrupt) {
 }
 
 void Projection::follow(Projection& other) {
+  const Eigen::Index common = std::min(b_.size(), other.b_.size());
+  b_.head(common) = other.b_.head(common);
+  given_ = e_->correction.at(b_);
+  if (other.unknowns() != unknowns() || other.residuals() != residuals()) return;
   other.renew(nullptr);
-  if (!other.known_ || other.unknowns() != unknowns() || other.A_.rows != static_cast<int>(e_->residual_count()))
-    return;
-  b_ = other.b_;
-  given_ = other.given_;
+  if (!other.known_) return;
   A_ = other.A_;
   place_ = other.place_;
   factor_ = other.factor_;
@@ -98,7 +100,7 @@ void Projection::restore(const double*& numbers) {
   for (Eigen::VectorXd* v : {&b_, &u_, &b_there_, &solved_}) *v = taken();
   const Eigen::VectorXd X = taken();
   X_ = Eigen::MatrixXd::Map(X.data(), X.size() == 0 ? 0 : unknowns(), parameters_);
-  given_ = in_meters(b_);
+  given_ = e_->correction.at(b_);
   stale_ = known_ && !(followed && followed_);
 }
 
@@ -106,11 +108,6 @@ Eigen::VectorXd Projection::predicted(const double* u) const {
   const Eigen::Map<const Eigen::VectorXd> here(u, parameters_);
   if (X_.size() == 0 || (solved_.size() > 0 && here == solved_)) return b_;
   return b_there_ + X_ * (here - u_);
-}
-
-std::vector<double> Projection::in_meters(const Eigen::VectorXd& b) const {
-  const Eigen::VectorXd meters = e_->correction.sigma * b;
-  return {meters.data(), meters.data() + meters.size()};
 }
 
 // Quasi-Newton steps (limited-memory BFGS, Nocedal & Wright 2006, algorithm 7.4) that begin with the normal matrix of A, from here or from an earlier
@@ -142,7 +139,7 @@ void Projection::solve(const std::vector<double>& theta, const double* u, double
     return q;
   };
   const auto relinearize = [&] {
-    linearize(*there, {theta, in_meters(best), guiding}, damping, interrupt);
+    linearize(*there, {theta, e_->correction.at(best), guiding}, damping, interrupt);
     pairs.clear();
     since = 0;
     fresh = true;
@@ -151,7 +148,7 @@ void Projection::solve(const std::vector<double>& theta, const double* u, double
     const bool must = std::isinf(cost) && trial == b_;  // there is nothing else to try
     std::unique_ptr<Corrected> here;
     try {
-      here = Corrected::at(*e_, theta.data(), in_meters(trial).data(), interrupt);
+      here = Corrected::at(*e_, theta.data(), e_->correction.at(trial).data(), interrupt);
     } catch (const Diverged&) {
       if (must) throw;
     } catch (const Unconverged&) {
@@ -182,7 +179,9 @@ void Projection::solve(const std::vector<double>& theta, const double* u, double
     } else {
       const double gain = (cost - cost_here) / decrease;
       const std::vector<double> by_b = here->gradient(interrupt);
-      VectorXd next = e_->correction.sigma * VectorXd::Map(by_b.data(), unknowns()) + trial;
+      VectorXd next =
+          VectorXd::Map(e_->correction.sigma.data(), unknowns()).cwiseProduct(VectorXd::Map(by_b.data(), unknowns())) +
+          trial;
       if (step.size() > 0 && step.dot(next - gradient) > 0.0) pairs.emplace_back(step, next - gradient);
       best = trial;
       there = std::move(here);
@@ -204,7 +203,7 @@ void Projection::solve(const std::vector<double>& theta, const double* u, double
   if (damping > 0.0 || !(decrease <= within_rounding * cost)) throw NoCorrection();
   b_ = best;
   solved_ = VectorXd::Map(u, parameters_);
-  given_ = in_meters(best);
+  given_ = e_->correction.at(best);
   if (exact_)
     linearize(*Corrected::at(*e_, theta.data(), given_.data(), interrupt), {theta, given_, exact}, 0.0, interrupt);
   exact_ = false;

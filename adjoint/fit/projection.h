@@ -1,4 +1,4 @@
-// The correction b of one experiment's boundary, solved for at every theta (variable projection, Golub & Pereyra 1973). With r the residuals, b in units
+// The correction b of one experiment, solved for at every theta (variable projection, Golub & Pereyra 1973). With r the residuals, b in units
 // of its prior's deviation and A = dr/db,
 //
 //   b(theta) = argmin |r(theta, b)|^2 + |b|^2,      X = -(A^T A + 1)^-1 A^T J_theta,
@@ -19,7 +19,9 @@ namespace sheetbend {
 struct NoCorrection : std::runtime_error {
   NoCorrection()
       : std::runtime_error(
-            "the correction of driven markers did not converge. Fix: start nearer, or fit a shorter window first") {}
+            "what is estimated along the way (a start, the motion of driven markers) did not converge. Fix: start "
+            "nearer, or "
+            "fit a shorter window first") {}
 };
 
 class Projection {
@@ -27,7 +29,7 @@ class Projection {
   Projection(const Experiment& e, int parameters, int threads);  // parameters: of the optimizer
 
   int unknowns() const { return e_->correction.unknowns(); }
-  const std::vector<double>& b() const { return given_; }  // [m]
+  const std::vector<double>& b() const { return given_; }  // all numbers, in their units
 
   // b(theta), and the residuals there (residual_count); u are the optimizer's parameters that make theta. Throws what the rollout throws, and
   // NoCorrection; b is then as it was.
@@ -49,7 +51,7 @@ class Projection {
   }
 
   // Goes on from where a projection of the same recording ended, such as one of the same motion with another solver: from its b, and its A guides the
-  // steps until they are many. Where its numbers or residuals are others, nothing follows.
+  // steps until they are many. Where its numbers or residuals are others, as in another window, only those numbers follow that both begin with.
   void follow(Projection& other);
 
   // Everything besides u that later results depend on, appended to numbers; and a projection that goes on from there to the same bits, which
@@ -59,11 +61,11 @@ class Projection {
   void restore(const double*& numbers);
 
  private:
+  std::size_t residuals() const { return e_->residual_count(); }
   Eigen::VectorXd predicted(const double* u) const;
-  std::vector<double> in_meters(const Eigen::VectorXd& b) const;
   // A at (theta, b), where `here` was made.
   struct Place {
-    std::vector<double> theta, b;  // b [m]
+    std::vector<double> theta, b;  // b in its units
     double tolerance = 0.0;
   };
   void linearize(const Corrected& here, Place place, double damping, Interrupt* interrupt);

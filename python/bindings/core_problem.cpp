@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "adjoint/fit/evaluation.h"
+#include "adjoint/settled.h"
 #include "python/bindings/interrupt.h"
 #include "python/bindings/solver.h"
 
@@ -76,14 +77,19 @@ ForceSensor make_sensor(const Scene& scene, const py::dict& d) {
   return s;
 }
 
-BoundaryCorrection make_correction(const py::dict& d) {
-  BoundaryCorrection c;
-  c.sigma = get<double>(d, "sigma");
+Estimated make_correction(const py::dict& d) {
+  Estimated c;
+  c.sigma = numbers(d, "sigma");
   c.given = numbers(d, "given");
   c.first = whole_numbers(d["first"]);
   c.target = whole_numbers(d["target"]);
   c.weight = numbers(d, "weight");
   return c;
+}
+
+Start start_of(const std::string& name) {
+  if (name == "estimated" || name == "settled") return Start::settled;
+  return name == "equilibrium" ? Start::equilibrium : Start::given;
 }
 
 Experiment make_experiment(const py::dict& d) {
@@ -110,7 +116,12 @@ Experiment make_experiment(const py::dict& d) {
   for (const py::handle sensor : d["sensors"]) e.sensors.push_back(make_sensor(*e.scene, sensor.cast<py::dict>()));
   if (!d["correction"].is_none()) e.correction = make_correction(get<py::dict>(d, "correction"));
   e.is_static = get<bool>(d, "is_static");
-  e.start = get<bool>(d, "starts_at_equilibrium") ? Start::equilibrium : Start::given;
+  e.start = start_of(get<std::string>(d, "start"));
+  if (e.start == Start::settled) {
+    o.h = settling_substep * e.plan.options.h;
+    o.iterations = std::max(o.iterations, settling_iterations);
+    e.settling = make_plan(*e.scene, o);
+  }
   e.t0 = get<double>(d, "t0");
   e.equilibrium.t0 = e.t0;
   return e;

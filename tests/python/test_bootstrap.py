@@ -123,7 +123,7 @@ def test_intervals_move_with_the_estimates() -> None:
 def test_what_cannot_be_drawn_is_refused() -> None:
     with pytest.raises(sb.InputError, match=r"bootstrap.*at least 50"):
         sb.fit(fallen(0), parameters=NAMES, bootstrap=10, **PLAIN)
-    hand = SimpleNamespace(name="hand", driven_sigma="estimate", shooting=None)
+    hand = SimpleNamespace(name="hand", driven_sigma="estimate", shooting=None, start="given")
     with pytest.raises(sb.InputError, match=r"bootstrap.*`driven_sigma` of 'hand'"):
         check_bootstrap(50, SimpleNamespace(experiments=[hand]))  # type: ignore[arg-type]
 

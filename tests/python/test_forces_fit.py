@@ -370,7 +370,7 @@ def test_noise_of_what_drives_is_told_where_forces_feel_it() -> None:
     result = sb.fit(e, parameters=["rope_density"], **QUICK).result
     (told,) = [w for w in result.warnings if "moves what force reads" in w]
     assert "smoother poses" in told
-    with pytest.raises(sb.InputError, match="correction of driven markers"):
+    with pytest.raises(sb.InputError, match="do not go with driven_sigma"):
         replace(e, driven_sigma=2e-4)
 
 

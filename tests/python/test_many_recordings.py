@@ -16,6 +16,7 @@ import sheetbend as sb
 from pytest import approx
 from sheetbend.errors import InputError
 from sheetbend.experiment.wanted import as_parameters
+from sheetbend.minimum import blocks
 from sheetbend.minimum.approach import inside
 from sheetbend.minimum.blocks import ManyProblem
 from sheetbend.minimum.problem import FitProblem
@@ -109,8 +110,11 @@ def test_recordings_that_differ_widen_the_interval() -> None:
 
 
 @pytest.mark.parametrize("executor", [Backwards(), ThreadPoolExecutor(3)])
-def test_the_bits_do_not_depend_on_the_workers(executor: Executor) -> None:
-    alone, shared = fitted(), sb.fit_many(swings(), WANTED, executor=executor)
+def test_the_bits_do_not_depend_on_the_workers(executor: Executor, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nor on how many problems a process keeps."""
+    alone = fitted()
+    monkeypatch.setattr(blocks, "KEPT", 3)
+    shared = sb.fit_many(swings(), WANTED, executor=executor)
     executor.shutdown(wait=False)
     took = {"seconds": 0.0}
     assert repr(replace(shared, **took)) == repr(replace(alone, **took))

@@ -38,7 +38,10 @@ def at_starting_values(e: Experiment, duration: float | None) -> tuple[Recording
         part = e.fitted()
     else:
         stop = None if duration is None else e.t0 + duration
-        whole = replace(e, fit=None, held_out=None, start_time=e.t0, recording=e.recording.piece(e.t0, stop))
+        start = "settled" if e.start == "estimated" else e.start
+        whole = replace(
+            e, start=start, fit=None, held_out=None, start_time=e.t0, recording=e.recording.piece(e.t0, stop)
+        )
         part = whole.fitted()
     theta = e.scene.compiled.theta
     problem = _core.Problem(

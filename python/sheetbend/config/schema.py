@@ -135,8 +135,12 @@ class RecordingSection(Section):
         None, "recording time at which the scene starts; by default the start of `fit`", "s"
     )
     static: bool = key(False, "it shows an equilibrium; the frames of `fit` are averaged")
-    start: Literal["given", "equilibrium"] = key(
-        "given", "a motion starts from the initial shape, or from the scene's equilibrium"
+    start: Literal["given", "estimated", "equilibrium"] = key(
+        "given",
+        "a motion starts from the initial shape and velocities, or from the scene's equilibrium. Where the recording "
+        'begins in the middle of a motion, "estimated": the fit finds the places and velocities of ropes and cloths at '
+        "the start along with the parameters. The initial shape and velocities are where it begins, such as those "
+        "through the markers",
     )
     predict: Literal["window", "mean"] | None = key(
         None,

@@ -47,10 +47,10 @@ def check_bootstrap(draws: int, problem: FitProblem) -> None:
         fix = f"give 0 for none, or at least {FEWEST_DRAWS}; 200 tell an interval to about 10 %"
         raise InputError("bootstrap", "must be large enough to show an interval", draws, fix)
     for e in problem.experiments if draws else ():
-        if e.driven_sigma is not None or e.shooting is not None:
-            key = "driven_sigma" if e.driven_sigma is not None else "shooting"
+        given = {"driven_sigma": e.driven_sigma, "shooting": e.shooting, "start": e.start == "estimated" or None}
+        for key in (key for key, value in given.items() if value is not None):
             fix = f"leave out `bootstrap`, or `{key}` of {e.name!r}"
-            raise InputError("bootstrap", f"cannot draw from motions that `{key}` corrects over time", draws, fix)
+            raise InputError("bootstrap", f"cannot draw from motions with unknowns by `{key}`", draws, fix)
 
 
 def bootstrap(problem: FitProblem, u: Array, draws: int, autocorrelation_time: float) -> tuple[Bootstrap | None, str]:

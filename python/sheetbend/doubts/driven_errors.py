@@ -119,7 +119,9 @@ def drawn_noise(problem: FitProblem, u: Array, draws: int) -> DrivenErrors | Non
     known = {i: n for i, n in every.items() if n is not None}
     if not known:
         return None
-    driven = problem.of([_following_all(e) if i in known else e for i, e in enumerate(problem.experiments)])
+    driven = problem.of([_following_all(e) if i in known else e for i, e in enumerate(problem.experiments)]).follow(
+        problem
+    )
     basis = spanned(problem.evaluate(u)[2])
     flat: dict[int, Array] = {}
     size: dict[int, float] = {}
@@ -156,7 +158,7 @@ def _responses(problem: FitProblem, driven: FitProblem, i: int, u: Array, draws:
     key, rows = (i, u.tobytes()), problem.core.first_rows
     found = known.get(key)
     if found is None:
-        found = np.asarray(driven.core.respond(i, u, draws[:PACK]))
+        found = driven.respond(i, u, draws[:PACK])
         _, r, _ = problem.evaluate(u)
         own = slice(rows[i], rows[i + 1])
         left = np.sqrt(_square(r[own]))
@@ -167,7 +169,7 @@ def _responses(problem: FitProblem, driven: FitProblem, i: int, u: Array, draws:
     if not len(found):
         return None
     if len(found) < len(draws):
-        known[key] = found = np.vstack([found, np.asarray(driven.core.respond(i, u, draws[len(found) :]))])
+        known[key] = found = np.vstack([found, driven.respond(i, u, draws[len(found) :])])
     return found[: len(draws)]
 
 

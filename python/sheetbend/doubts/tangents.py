@@ -39,7 +39,7 @@ def tangents(
     Raises:
         SheetbendError: the motion has no answer there.
     """
-    e = problem.experiments[i]
+    e = problem.experiment_at(i, u)
     theta, slots, _ = problem.known(u)
     own = theta[slots[i]]
     names = list(added)

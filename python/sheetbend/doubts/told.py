@@ -95,8 +95,8 @@ def told_numbers(problem: FitProblem, u: Array) -> tuple[list[Told], str]:
         if not ok:
             raise SheetbendError(problem.failure)
         corrections = problem.corrections(u)
-        every = enumerate(zip(problem.experiments, problem.recordings, strict=True))
-        return [one for i, (e, r) in every for one in _collect(problem, u, i, e, r, corrections.get(e.name))], ""
+        every = [(i, problem.experiment_at(i, u), r) for i, r in enumerate(problem.recordings)]
+        return [one for i, e, r in every for one in _collect(problem, u, i, e, r, corrections.get(e.name))], ""
     except (SheetbendError, _core.NoEquilibrium) as error:
         return [], str(error)
 

@@ -45,8 +45,11 @@ def check_parts(
     predict: str | None,
 ) -> None:
     """Refuse parts of a recording that cannot be fitted or predicted, see the fields of `Experiment`."""
-    if start not in ("given", "equilibrium"):
-        raise InputError(f"{name}.start", "is unknown", start, "use 'given' or 'equilibrium'")
+    if start not in ("given", "settled", "equilibrium", "estimated"):
+        raise InputError(f"{name}.start", "is unknown", start, "use 'given', 'estimated' or 'equilibrium'")
+    if start == "estimated" and (static or predict is not None):
+        what = "an equilibrium" if static else "a recording that is only predicted"
+        raise InputError(f"{name}.start", f"cannot be estimated for {what}", start, "leave it out")
     if predict not in (None, "window", "mean"):
         raise InputError(f"{name}.predict", "is unknown", predict, "use 'window' or 'mean', or leave it out")
     if start_time is not None and not math.isfinite(start_time):
@@ -74,16 +77,17 @@ def check_driven_sigma(name: str, given: float | str | None, scene: Scene) -> No
         raise InputError(f"{name}.driven_sigma", "has no driven marker to correct", given, fix)
 
 
-def check_forces(name: str, sensors: Sequence[ForceSensor], scene: Scene, static: bool, corrected: bool) -> None:
-    """Refuse force sensors that share a name, or that a scene or an experiment cannot have."""
+def check_forces(name: str, sensors: Sequence[ForceSensor], scene: Scene, static: bool, unknown: str | None) -> None:
+    """Refuse force sensors that share a name, or that a scene or an experiment cannot have, such as beside a field for
+    which numbers are estimated along with the parameters."""
     names = [sensor.name for sensor in sensors]
     if len(set(names)) != len(names):
         raise InputError(f"{name}.forces", "share a name", names, "give each sensor a name of its own")
     if sensors and static:
         fix = "give a motion, or fit a still load by its shape alone"
         raise InputError(f"{name}.forces", "are compared along motions, not at rest", names, fix)
-    if sensors and corrected:
-        fix = "leave out driven_sigma, or the forces"
-        raise InputError(f"{name}.forces", "do not go with a correction of driven markers", names, fix)
+    if sensors and unknown is not None:
+        fix = f"leave out {unknown}, or the forces"
+        raise InputError(f"{name}.forces", f"do not go with {unknown}", names, fix)
     for i, sensor in enumerate(sensors):
         sensor.check(scene, f"{name}.force[{i}]")

@@ -88,8 +88,8 @@ class Correction:
         if given is not None:
             full[: len(given)] = given[: self.knots]
         return {
-            "sigma": sigma,
-            "given": full,
+            "sigma": np.full(full.size, sigma),
+            "given": full.ravel(),
             "first": self.first,
             "target": offset + self.target,
             "weight": self.weight,

@@ -19,6 +19,7 @@ from ..recording.windows import Window
 from ..scene.scene import Scene
 from .checks import check_driven_sigma, check_errors, check_forces, check_parts
 from .correction import Correction, recorded_noise
+from .estimated_start import EstimatedStart, together
 from .force_sensor import INPUTS, ForceSensor
 from .names import check_names
 from .of_cloud import check_cloud, surface_of
@@ -40,8 +41,10 @@ class Experiment:
         held_out: the part that is only predicted, from the same start; None = none.
         solver: substep and method of the motion; must suit the recording (h well below the frame interval).
         static: the recording shows an equilibrium; its frames in the window are averaged into one.
-        start: "given" (the scene's initial state) or "equilibrium" (of the scene at the start, forces included), for
-            motions.
+        start: of motions, "given" (the scene's initial state), "equilibrium" (of the scene at the start, forces
+            included), or "estimated": the fit finds the places and velocities of ropes and cloths at the start along
+            with the parameters, from the scene's initial state on; for recordings that begin in the middle of a motion.
+            A "settled" start is the given one once rigid links hold; an estimated one settles too.
         start_time: recording time at which the scene starts, s; the start of the fit window by default.
         time_offset: name of a quantity [s] that is added to the recording's times to get the scene's, or None. It is
             negative for a camera that is late: what its frame at 1 s shows happened at 0.7 s of the scene where it is
@@ -96,6 +99,7 @@ class Experiment:
         if self.is_cloud:
             of_markers = {"markers": self.markers, "offsets": self.offsets, "axes": self.axes.removeprefix("xyz")}
             not_yet = {"driven_sigma": self.driven_sigma, "radius": self.radius, "shooting": self.shooting}
+            not_yet["start"] = "estimated" if self.start == "estimated" else None
             check_cloud(self.name, self.scene, of_markers, not_yet)
         check_errors(self.name, self.axes, self.radius, self.loss, self.loss_scale, self.sigma, self.is_cloud)
         check_parts(self.name, self.fit, self.held_out, self.static, self.start, self.start_time, self.predict)
@@ -103,8 +107,10 @@ class Experiment:
         check_driven_sigma(self.name, self.driven_sigma, self.scene)
         if corrected:
             assert self.driven_noise is not None  # raises where the recording shows too little
-        check_forces(self.name, self.forces, self.scene, self.static, corrected)
+        unknown = "driven_sigma" if corrected else "start" if self.start == "estimated" else None
+        check_forces(self.name, self.forces, self.scene, self.static, unknown)
         beside = {"static": self.static, "forces": bool(self.forces), "driven_sigma": corrected, "time_offset": late}
+        beside["start"] = self.start == "estimated"
         object.__setattr__(self, "shooting", Shooting.given(self.name, self.shooting, beside))
 
     @cached_property
@@ -286,6 +292,13 @@ class Experiment:
         return {}
 
     @cached_property
+    def estimated_start(self) -> EstimatedStart | None:
+        """The numbers of a start that is estimated; None of another."""
+        if self.start != "estimated":
+            return None
+        return EstimatedStart.of(self.name, self.scene, self.compared_places, self.fitted(), self.sigma)
+
+    @cached_property
     def _can_step(self) -> bool:
         """Asked once, so that what the solver refuses or warns of is told before any fit."""
         self.solver.core(self.scene.compiled)
@@ -296,7 +309,8 @@ class Experiment:
 
         Args:
             corrected: (knots, markers, 3) m, a known correction of the markers that the scene follows; by default the
-                fit finds it where there is a `driven_sigma`, and otherwise it is zero.
+                fit finds it where there is a `driven_sigma`, and otherwise it is zero. A start is estimated in either
+                case.
         """
         compiled = self.scene.compiled
         if not self.static:
@@ -311,9 +325,15 @@ class Experiment:
         correction = self.correction(recording)
         _ = self.static or self._can_step
         sigma = 0.0 if corrected is not None else self.driven_noise or 0.0
-        if sigma > 0.0 and self.solver.extrapolate > 1 and not self.static:
-            fix = "leave one of the two out"
-            raise InputError(f"{self.name}.driven_sigma", "does not go with runs that are extrapolated", sigma, fix)
+        start = self.estimated_start
+        if (sigma > 0.0 or start is not None) and self.solver.extrapolate > 1 and not self.static:
+            fix, key = "leave one of the two out", "driven_sigma" if sigma > 0.0 else "start"
+            raise InputError(
+                f"{self.name}.{key}", "does not go with runs that are extrapolated", getattr(self, key), fix
+            )
+        layout = compiled.layout
+        driven = None if correction is None else correction.core(layout["boundary"][0], sigma, corrected)
+        own = None if start is None else start.core(layout)
         return {
             "name": self.name,
             "scene": compiled.core,
@@ -324,10 +344,8 @@ class Experiment:
             "most": compiled.domain.most,
             "observed": observed,
             "sensors": self.sensed(recording),
-            "correction": None
-            if correction is None
-            else correction.core(compiled.layout["boundary"][0], sigma, corrected),
+            "correction": together(own, driven),
             "is_static": self.static,
-            "starts_at_equilibrium": self.start == "equilibrium",
+            "start": self.start,
             "t0": 0.0,
         }

@@ -213,7 +213,9 @@ def fit(
         interrupted = True
         conclusion = conclude(reached, experiments, wanted, asked, None)
     corrected = conclusion.at.problem.corrections(conclusion.at.u) | conclusion.corrected
-    comparisons = compare(conclusion.experiments, wanted, conclusion.values, threads, corrected)
+    at = {e.name: conclusion.at.problem.experiment_at(i, conclusion.at.u) for i, e in enumerate(fitted)}
+    found = [at.get(e.name, e) for e in conclusion.experiments]
+    comparisons = compare(found, wanted, conclusion.values, threads, corrected)
     result = result_of(reached, conclusion, comparisons, left_out, corrected, fields, interrupted, clock)
     if optimizer == "auto" and (trouble := ceres_trouble()):
         result = replace(

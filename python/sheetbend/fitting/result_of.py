@@ -20,6 +20,7 @@ from ..doubts.stationary import unfinished
 from ..doubts.touching import kinks, pressed_in, what_touches
 from ..doubts.unexplained import unexplained
 from ..experiment.clock import outside, told_clocks
+from ..experiment.found_start import start_moved
 from ..minimum.continuity import shot_motions
 from ..minimum.counts import counted
 from ..minimum.field_fits import field_fits
@@ -79,7 +80,8 @@ def result_of(
     fitted, parameters = problem.experiments, problem.parameters
     rows = problem.core.first_rows
     count = {e.name: rows[i + 1] - rows[i] for i, e in enumerate(fitted)}
-    errors = tuple(recording_fit(c, count, left_out, corrected) for c in comparisons)
+    starts = {e.name: start_moved(e, at.problem.starts(at.u)[e.name]) for e in fitted if e.start == "estimated"}
+    errors = tuple(recording_fit(c, count, left_out, corrected, starts) for c in comparisons)
     other_starts = [Elsewhere(m.cost - best.cost, parameters.to_physical(m.u), "another start") for m in ends[1:]]
     stopped, ahead = unfinished(problem, best, judged)
     missed = unexplained(problem, comparisons, judged.autocorrelation_time, at.u)

@@ -19,10 +19,14 @@ from ..statistics.profile import Profile
 
 
 def recording_fit(
-    c: Comparison, rows: Mapping[str, int], left_out: Mapping[str, Comparison], corrected: Mapping[str, np.ndarray]
+    c: Comparison,
+    rows: Mapping[str, int],
+    left_out: Mapping[str, Comparison],
+    corrected: Mapping[str, np.ndarray],
+    starts: Mapping[str, tuple[float, float]],
 ) -> RecordingFit:
-    """Errors of one recording, with the correction of its driven markers, predicted by the others where it was left
-    out.
+    """Errors of one recording, with the correction of its driven markers and what an estimated start was moved by,
+    predicted by the others where it was left out.
 
     Args:
         rows: number of residuals by recording.
@@ -31,11 +35,17 @@ def recording_fit(
     if c.experiment.name in corrected:
         by = float(np.sqrt(np.mean(corrected[c.experiment.name] ** 2)))
         found = replace(found, driven_sigma=c.experiment.driven_noise, corrected_by=by)
+    found = replace(found, start_moved=starts.get(c.experiment.name))
     if c.experiment.name not in left_out:
         return found
     other = _errors(left_out[c.experiment.name], 0)
     return replace(
-        other, rows=found.rows, rms=found.rms, driven_sigma=found.driven_sigma, corrected_by=found.corrected_by
+        other,
+        rows=found.rows,
+        rms=found.rms,
+        driven_sigma=found.driven_sigma,
+        corrected_by=found.corrected_by,
+        start_moved=found.start_moved,
     )
 
 

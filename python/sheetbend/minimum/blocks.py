@@ -31,6 +31,7 @@ from .triangle import triangle
 from .workers import Common
 
 CHUNK = 16  # recordings in a piece of work
+KEPT = 2000  # recordings whose problems a process keeps: some 0.1 MB each, and making one takes 1 ms
 PASSES = 8  # of a step, each holding own numbers at the sides that they have met
 SMALL = 1e-4  # of the cost of one row: what a step must promise
 
@@ -159,7 +160,8 @@ class ManyProblem:
     def __init__(self, experiments: Sequence[Experiment], parameters: Parameters) -> None:
         """
         Raises:
-            InputError: recordings share a name, correct the markers that their scenes follow, or are shot in windows.
+            InputError: recordings share a name, correct the markers that their scenes follow, estimate their starts,
+                or are shot in windows.
         """
         self.experiments, self.failure = tuple(experiments), ""
         names = [e.name for e in experiments]
@@ -169,6 +171,8 @@ class ManyProblem:
         corrected = [e.name for e in experiments if e.driven_noise is not None]
         if corrected:
             raise InputError("driven_sigma", "does not go with many recordings", corrected[:5], "use sheetbend.fit")
+        if unknown := [e.name for e in experiments if e.start == "estimated"]:
+            raise InputError("start", "is not estimated of many recordings", unknown[:5], "use sheetbend.fit")
         if in_windows := [e.name for e in experiments if e.shooting is not None]:
             raise InputError("shooting", "does not go with many recordings", in_windows[:5], "use sheetbend.fit")
         self.parameters = expanded_to(parameters, self.experiments)
@@ -223,7 +227,8 @@ class ManyProblem:
 
 
 class _Recordings:
-    """What a worker has of the recordings: problems of one recording each, once they are made."""
+    """What a worker has of the recordings: problems of one recording each, once they are made. The first `KEPT` stay,
+    and others are made again for every evaluation, so that memory is bounded; the bits are the same."""
 
     def __init__(self, experiments: tuple[Experiment, ...], parameters: Parameters, shared: tuple[str, ...]) -> None:
         self.experiments, self.parameters, self.shared = experiments, parameters, shared
@@ -237,9 +242,9 @@ class _Recordings:
         which, own, shared, _ = item
         known, found, begun = dict(zip(self.shared, shared, strict=True)), [], 0
         for i in which:
-            if i not in self._made:
-                self._made[i] = FitProblem([self.experiments[i]], self.parameters)
-            problem = self._made[i]
+            problem = self._made.get(i) or FitProblem([self.experiments[i]], self.parameters)
+            if len(self._made) < KEPT:
+                self._made[i] = problem
             free = problem.parameters.free
             mine = np.array([k for k, name in enumerate(free) if name not in known], dtype=int)
             u = np.array([known.get(name, math.nan) for name in free])

@@ -100,7 +100,7 @@ class LiftedWindow:
         }
         core["map"]["base"] = np.append(core["map"]["base"], np.zeros(3 * len(particles)))
         core["t0"] = float(edges[number]) - e.t0
-        core["starts_at_equilibrium"] = core["starts_at_equilibrium"] and number == 0
+        core["start"] = core["start"] if number == 0 else "given"
         if number:
             core["name"] = f"{e.name} from {edges[number]:.6g} s"
         frame, marker = np.nonzero(np.isfinite(measured[..., 0]))

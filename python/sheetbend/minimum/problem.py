@@ -21,6 +21,7 @@ from .coordinates import Coordinates, sums_of
 from .counts import count
 from .journal import Evaluator, Timed
 from .lifted import Known, Lifted, WithStates, lifted
+from .on_the_way import OnTheWay
 from .parts import expanded_to, reaching
 from .spread import Spread
 
@@ -28,7 +29,7 @@ NOTHING = np.zeros((0, 1, 3))  # no correction at any knot
 CHEAP = 3.0  # times the residuals: a Jacobian that costs less is made with them
 
 
-class FitProblem:
+class FitProblem(OnTheWay):
     """Experiments with shared and private parameters, compiled for one set of recordings' parts.
 
     Attributes:
@@ -118,9 +119,15 @@ class FitProblem:
     def follow(self, other: FitProblem) -> FitProblem:
         """This problem, with corrections that begin where those of another one of the same recordings ended: most of
         the search for them is saved."""
-        if self.estimates_corrections and other.estimates_corrections:
+        if self is not other and self.estimates_corrections and other.estimates_corrections:
             self.core.follow(other.core)
         return self
+
+    def on(self, recordings: Sequence[Recording]) -> FitProblem:
+        """The same problem on parts of the recordings."""
+        return FitProblem(
+            self.experiments, self.given, recordings, self.threads, self.parameters, corrected=self._corrected
+        )
 
     def uncorrected(self, recordings: Sequence[Recording]) -> FitProblem:
         """The same problem on (parts of) the recordings, with the markers that scenes follow taken for the truth."""
@@ -259,39 +266,6 @@ class FitProblem:
             self.core.relinearize()
             self._last = None
         return self.evaluate(u)
-
-    @property
-    def estimates_corrections(self) -> bool:
-        """Whether an experiment corrects the markers that its scene follows."""
-        return self.core.rows > self.prior_rows[1]
-
-    @property
-    def prior_rows(self) -> tuple[int, int]:
-        """First row of the parameters' priors, and one past the last; those of corrections follow."""
-        first = self.core.data_rows
-        return first, first + len(self.parameters.prior_residuals(self.parameters.initial()))
-
-    def corrections(self, u: np.ndarray) -> dict[str, np.ndarray]:
-        """(knots, markers, 3) m by name of experiment, what is added at u to the markers that its scene follows; of
-        those that estimate it."""
-        found: dict[str, np.ndarray] = {}
-        for i, own in self.correction_rows.items():
-            e, correction = self.experiments[i], self.experiments[i].correction(self.recordings[i])
-            if correction is not None and e.driven_noise is not None:
-                found[e.name] = e.driven_noise * self.evaluate(u)[1][own].reshape(correction.shape)
-        return found
-
-    @property
-    def correction_rows(self) -> dict[int, slice]:
-        """The rows that corrections leave, by the place of their experiment."""
-        found: dict[int, slice] = {}
-        end = self.prior_rows[1]
-        if self.estimates_corrections:
-            for i, (e, r) in enumerate(zip(self.experiments, self.recordings, strict=True)):
-                correction = e.correction(r)
-                if correction is not None and e.driven_noise is not None:
-                    found[i] = slice(end, end := end + int(np.prod(correction.shape)))
-        return found
 
     @property
     def cheap_jacobian(self) -> bool:

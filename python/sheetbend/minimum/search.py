@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -21,12 +22,13 @@ from .optimizers import Minimum, Observer, Progress, judged, minimize, named
 from .problem import FitProblem
 from .race import Course, Raced, groups_of, race
 from .starts import drawn, off_bounds
-from .windows import STEPS, TOLERANCE, along, chosen, cut
+from .windows import STEPS, TOLERANCE, along, chosen, cut, holds_frames
 
 AUTO = "auto"
 NEAR_TOLERANCE = 1e-3  # of the cost: what is left is for the optimizer
 MUCH, DONE = 0.25, 1e-3  # of the cost: what a first step promises where the start is near, and at the minimum
 KEPT = 0.9  # of what such a step promises, that it takes off
+BEGINNINGS = (0.125, 0.25, 0.5)  # of the longest motion, for corrections that are not found in all of it
 NOISE = 2.0  # sigmas: a start whose residuals are no larger is near, too
 
 
@@ -113,7 +115,7 @@ class Search:
 
     def _raced(self, problem: FitProblem, name: str, points: Sequence[np.ndarray]) -> Found:
         """Race all starts, and go on from the best of each group. Ctrl-C passes through as long as they race."""
-        whole = problem.uncorrected(problem.recordings) if problem.estimates_corrections else problem
+        whole = problem.uncorrected(problem.recordings) if problem.corrects_markers else problem
         auto = isinstance(self.windows, str)
         course = Course(whole, chosen(problem, growths(problem, points[0])) if auto else [*map(float, self.windows)])
         window = None if math.isinf(course.lengths[-1]) else course.lengths[-1]
@@ -201,9 +203,7 @@ class _Way:
     def end(self, grown: Sequence[Growth]) -> Minimum:
         """Raises SheetbendError where the whole motion diverges at the start and after every window."""
         most = self.search.max_iterations
-        whole = (
-            self.problem.uncorrected(self.problem.recordings) if self.problem.estimates_corrections else self.problem
-        )
+        whole = self.problem.uncorrected(self.problem.recordings) if self.problem.corrects_markers else self.problem
         given = [] if isinstance(self.search.windows, str) else [float(length) for length in self.search.windows]
         if given:
             self._began(self.start, whole.cost(self.start))
@@ -221,7 +221,7 @@ class _Way:
             raise SheetbendError(f"the fit cannot start: {whole.failure}")
         self._walk(walk, NEAR_TOLERANCE, most - 1, None)
         if whole is not self.problem:
-            walk = Approach(self.problem, walk.u, self.taken)
+            walk = self._corrected(whole, walk.u)
             self._walk(walk, NEAR_TOLERANCE, most - 1, None)
         end = self._arrived_at(walk) or self._optimized(walk, max(1, most - walk.iterations))
         try:
@@ -229,6 +229,22 @@ class _Way:
         except KeyboardInterrupt:
             end = replace(end, interrupted=True)
         return self._counted(end)
+
+    def _corrected(self, whole: FitProblem, u: np.ndarray) -> Approach:
+        """From a fit that takes what drives the scenes for the truth to one that corrects it. Where no correction of
+        the whole motion is found at once, those of its beginnings are, each from the one before."""
+        walk = Approach(self.problem.follow(whole), u, self.taken)
+        if np.isfinite(walk.cost):
+            return walk
+        pairs = zip(self.problem.experiments, self.problem.recordings, strict=True)
+        longest = max((float(r.times[-1]) - e.t0 for e, r in pairs if not e.static), default=0.0)
+        parts = [share * longest for share in BEGINNINGS if holds_frames(self.problem, share * longest)]
+        for length, walk in along(self.problem, [*parts, math.inf], u, self.taken, partial(cut, corrected=True)):
+            if math.isinf(length):
+                return walk
+            self._walk(walk, TOLERANCE, min(STEPS, self.search.max_iterations), length)
+            self.windows.append(length)
+        raise AssertionError("the whole motion comes last")
 
     def _arrived_at(self, walk: Approach) -> Minimum | None:
         """Where the walk ended, if its last step promised less than a tolerance that is no finer than the walk's own:

@@ -50,9 +50,9 @@ def chosen(problem: FitProblem, growths: Sequence[Growth]) -> tuple[float, ...]:
     return tuple(lengths)
 
 
-def cut(problem: FitProblem, length: float) -> FitProblem:
+def cut(problem: FitProblem, length: float, corrected: bool = False) -> FitProblem:
     """The problem with the first `length` s of every motion from its scene's start on, markers that scenes follow taken
-    for the truth.
+    for the truth, or corrected as in the problem itself.
 
     Raises:
         InputError: a motion has no fitted frame there.
@@ -64,7 +64,7 @@ def cut(problem: FitProblem, length: float) -> FitProblem:
             fix = "make it longer, or leave it out"
             raise InputError("windows", f"hold no fitted frame of '{e.name}'", length, fix)
         pieces.append(recording if e.static else recording.piece(None, last))
-    return problem.uncorrected(pieces)
+    return problem.on(pieces) if corrected else problem.uncorrected(pieces)
 
 
 def along(
@@ -74,26 +74,28 @@ def along(
     tally: Tally,
     part_of: Callable[[FitProblem, float], FitProblem] | None = None,
 ) -> Iterator[tuple[float, Approach]]:
-    """Window after window, each with a walk that begins where the one before was left, for the caller to walk; where
-    one diverges at the values of the one before, one in between comes first. The length of the whole motion is
-    infinite. Where there is no way on, the whole motion comes last, with an infinite cost or not.
+    """Window after window, each with a walk that begins where the one before was left, for the caller to walk, as do
+    starts that are estimated; where one diverges at the values of the one before, one in between comes first. The
+    length of the whole motion is infinite. Where there is no way on, the whole motion comes last, with an infinite cost
+    or not.
 
     Args:
         part_of: makes the problem of a window; `cut` by default.
     """
     longest = max(float(r.times[-1]) - e.t0 for e, r in zip(whole.experiments, whole.recordings, strict=True))
-    ahead, reached, made = [*lengths], 0.0, part_of or cut
+    ahead, reached, made, before = [*lengths], 0.0, part_of or cut, whole
     while ahead:
-        walk = Approach(whole if math.isinf(ahead[0]) else made(whole, ahead[0]), u, tally)
+        part = whole if math.isinf(ahead[0]) else made(whole, ahead[0])
+        walk = Approach(part.follow(before), u, tally)
         if math.isfinite(walk.cost):
-            reached = ahead.pop(0)
+            reached, before = ahead.pop(0), part
             yield reached, walk
             u = walk.u
             continue
         upto = min(ahead[0], longest)
         between = 0.5 * (reached + upto)
         if upto - reached < BACK * upto or not holds_frames(whole, between):
-            yield math.inf, Approach(whole, u, tally)
+            yield math.inf, Approach(whole.follow(before), u, tally)
             return
         ahead.insert(0, between)
 

@@ -125,6 +125,22 @@ def modes_of_triangles(corners: Array, triangles: NDArray[np.intp]) -> tuple[Arr
         corners: (triangles, 3, 2) m, flat.
         triangles: (triangles, 3) vertices.
     """
+    _, places, laplacian, area = laplacian_of_triangles(corners, triangles)
+    values, vectors = np.linalg.eigh(laplacian / np.sqrt(np.outer(area, area)))
+    shapes = _signed(vectors / np.sqrt(area / area.sum())[:, None])
+    return np.maximum(values, 0.0), shapes[places].mean(axis=1)
+
+
+def laplacian_of_triangles(
+    corners: Array, triangles: NDArray[np.intp]
+) -> tuple[NDArray[np.intp], NDArray[np.intp], Array, Array]:
+    """The Laplace operator in linear finite elements on some vertices: their numbers (n,), where the corners of each
+    triangle are among them (triangles, 3), the matrix (n, n), and the area (n,) m^2 of each.
+
+    Args:
+        corners: (triangles, 3, 2) m, flat.
+        triangles: (triangles, 3) vertices.
+    """
     known, places = np.unique(triangles, return_inverse=True)
     n, places = len(known), places.reshape(triangles.shape)
     opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
@@ -132,10 +148,8 @@ def modes_of_triangles(corners: Array, triangles: NDArray[np.intp]) -> tuple[Arr
     weights = np.einsum("tia,tja->tij", opposite, opposite) / (2.0 * twice)[:, None, None]
     laplacian = np.zeros((n, n))
     np.add.at(laplacian, (places[:, :, None], places[:, None, :]), weights)
-    area = np.bincount(places.ravel(), np.repeat(twice / 6.0, 3), n)
-    values, vectors = np.linalg.eigh(laplacian / np.sqrt(np.outer(area, area)))
-    shapes = _signed(vectors / np.sqrt(area / area.sum())[:, None])
-    return np.maximum(values, 0.0), shapes[places].mean(axis=1)
+    area = np.asarray(np.bincount(places.ravel(), np.repeat(twice / 6.0, 3), n), dtype=float)
+    return known, np.asarray(places), np.asarray(laplacian), area
 
 
 def modes_of(centers: Array, neighbors: NDArray[np.intp]) -> tuple[Array, Array]:

@@ -26,6 +26,7 @@ def recordings(result: FitData) -> Section:
         for label, words in (
             ("held out", result.held_out_is),
             ("baseline (no physics)", result.baseline),
+            *((recording.name, _started(recording)) for recording in result.recordings),
             *((recording.name, _corrected(recording)) for recording in result.recordings),
         )
         if words
@@ -53,6 +54,16 @@ def _corrected(recording: RecordingFit) -> str:
     found, prior = (short(1e3 * size, 2) for size in (recording.corrected_by, recording.driven_sigma))
     return (
         f"its driven markers are moved by {found} mm in each coordinate (root mean square); driven_sigma is {prior} mm"
+    )
+
+
+def _started(recording: RecordingFit) -> str:
+    if recording.start_moved is None:
+        return ""
+    place, speed = recording.start_moved
+    return (
+        f"its start is estimated: {short(1e3 * place, 2)} mm and {short(speed, 2)} m/s from the given one in each "
+        "coordinate (root mean square)"
     )
 
 

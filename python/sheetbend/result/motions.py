@@ -23,6 +23,8 @@ class RecordingFit:
         late_half_width: s, of the 95 % interval of that; None where it is open or the clock was not fitted.
         driven_sigma: prior of the correction of its driven markers, m; None without one.
         corrected_by: root mean square of one coordinate of that correction, m.
+        start_moved: m and m/s, root mean squares of one coordinate, by which places and velocities of an estimated
+            start differ from the given ones; None of another start.
         measured_frequency, simulated_frequency: first frequency there, Hz; None where the part shows fewer than three
             periods.
     """
@@ -38,6 +40,7 @@ class RecordingFit:
     unit: str = "m"
     driven_sigma: float | None = None
     corrected_by: float | None = None
+    start_moved: tuple[float, float] | None = None
     without_physics: Mapping[str, float] = field(default_factory=dict)
     late: float | None = None
     late_half_width: float | None = None

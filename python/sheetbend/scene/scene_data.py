@@ -32,6 +32,12 @@ class Rows:
     def __init__(self) -> None:
         self.positions, self.velocities, self.mass = Column(3), Column(3), Column()
 
+    def moved(self, positions: Array, velocities: Array) -> Rows:
+        """A copy with (n, 3) m and m/s added."""
+        made = Rows()
+        made.extend(self.positions.values + positions, self.velocities.values + velocities, self.mass.values)
+        return made
+
     def extend(self, positions: Array, velocities: Array, mass: Array) -> None:
         self.positions.extend(positions)
         self.velocities.extend(velocities)

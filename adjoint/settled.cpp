@@ -1,0 +1,47 @@
+#include "adjoint/settled.h"
+
+#include "core/rollout/rollout.h"
+
+namespace sheetbend {
+namespace {
+
+template <class T>
+std::vector<T> at_rest(const Scene& scene, const T* inputs) {
+  std::vector<T> still(inputs, inputs + scene.layout.total());
+  std::fill_n(still.begin() + static_cast<std::ptrdiff_t>(scene.layout.of(Quantity::velocity)), scene.dofs(), T(0.0));
+  return still;
+}
+
+double before(const Plan& settling, double t0) { return t0 - settling.options.h; }
+
+}  // namespace
+
+template <class T>
+std::vector<T> settled_coordinates(const Scene& scene, const Plan& settling, const T* inputs, double t0) {
+  const std::vector<T> still = at_rest(scene, inputs);
+  Rollout<T> one(scene, settling, still.data(), before(settling, t0));
+  one.advance();
+  return {one.x(), one.x() + scene.dofs()};
+}
+
+template std::vector<double> settled_coordinates(const Scene&, const Plan&, const double*, double);
+template std::vector<Dual<double, 4>> settled_coordinates(const Scene&, const Plan&, const Dual<double, 4>*, double);
+template std::vector<Dual<double, 8>> settled_coordinates(const Scene&, const Plan&, const Dual<double, 8>*, double);
+
+Settled::Settled(const Scene& scene, const Plan& settling, const double* inputs, double t0)
+    : scene_(scene),
+      settling_(settling),
+      t0_(before(settling, t0)),
+      still_(at_rest(scene, inputs)),
+      x_(scene.dofs()),
+      tape_(record_rollout(scene, settling, still_.data(), t0_, {1}, x_.data(), every_state, nullptr)) {}
+
+void Settled::pull_back(const double* x_bar, double* inputs_bar) {
+  std::vector<double> own(scene_.layout.total());
+  reverse_rollout(scene_, settling_, still_.data(), t0_, tape_, {1}, x_bar, own.data(), nullptr);
+  const std::size_t v = scene_.layout.of(Quantity::velocity);
+  for (std::size_t i = 0; i < own.size(); ++i)
+    if (i < v || i >= v + scene_.dofs()) inputs_bar[i] += own[i];
+}
+
+}  // namespace sheetbend

@@ -1,0 +1,42 @@
+"""An experiment whose start a fit has estimated, starting there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ..motion.simulate import simulate
+from .estimated_start import fields_at
+from .experiment import Experiment
+
+Array = np.ndarray
+SHORT, ITERATIONS = 1e-3, 10  # of a substep, and of Newton in it: as in settled.h
+
+
+def started(e: Experiment, numbers: Array) -> Experiment:
+    """The experiment with a scene that starts with what a fit found.
+
+    Args:
+        numbers: (numbers,) of its start (`FitProblem.starts`).
+    """
+    assert e.estimated_start is not None
+    return replace(e, scene=e.scene.starting(*e.estimated_start.added(numbers, e.scene.node_count)), start="settled")
+
+
+def start_moved(e: Experiment, numbers: Array) -> tuple[float, float]:
+    """m and m/s, root mean square of one coordinate of the places and the velocities that are estimated."""
+    assert e.estimated_start is not None
+    x, v = e.estimated_start.added(numbers, e.scene.node_count)
+    moving = e.scene.free_nodes
+    return float(np.sqrt(np.mean(x[moving] ** 2))), float(np.sqrt(np.mean(v[moving] ** 2)))
+
+
+def settled(e: Experiment, values: Mapping[str, float]) -> Array:
+    """(nodes, 3) m, where the scene starts once rigid links hold, at values of its quantities."""
+    solver = replace(e.solver, h=SHORT * e.solver.h, iterations=max(ITERATIONS, e.solver.sweeps), extrapolate=1)
+    compiled = e.scene.compiled
+    inputs = compiled.inputs(compiled.values(values))
+    x, v = fields_at(compiled, inputs)
+    return np.asarray(simulate(e.scene, [solver.h], solver, values, x - solver.h * v).nodes[-1])
