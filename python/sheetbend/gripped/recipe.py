@@ -33,6 +33,7 @@ from .model import GRAVITY, NAME, RopeModel, nominal_directions, shared_gravity
 from .motion import Array, GrippedMotion, motions_of
 from .over_density import UNIT, as_quantities, named_over_density, over_density, said_over_density
 from .plausible import doubts, gravities
+from .rolls import rolls_said
 from .screening import screened
 from .search import Say, Search
 from .start import started
@@ -212,6 +213,7 @@ def fit_rope(
         *doubts(motions, rope.model.gravity),
         *_found_gravity(rope.model, meant),
         *_found_late(climb.late),
+        *([rolls_said(NAME, kept, rope.model.nominal, values)] if rope.model.rolls else []),
         *climb.search.left_out,
         *at_bounds(rope.parameters, values, rope.model, kept, last[0]),
         *_short_links(rope.model, values),
