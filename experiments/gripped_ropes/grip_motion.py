@@ -26,10 +26,21 @@ def motion(rope: Rope, rng: np.random.Generator, seconds: float) -> tuple[Grip, 
         apart = np.linalg.norm(x1 + base - x0, axis=1) / rope.length
         if APART[0] < apart.min() and apart.max() < APART[1]:
             break
-    q0, q1 = (carried(any_across(n), n, d) for n, d in zip(NOMINAL, (d0, d1), strict=True))  # as Grip.from_markers
+    q0, q1 = (_director(rope, n, d) for n, d in zip(NOMINAL, (d0, d1), strict=True))
     extra = rope.extra_roll * np.sin(2.0 * np.pi * 0.15 * _pace(times))[:, None]
     q1 = np.cos(extra) * q1 + np.sin(extra) * np.cross(d1, q1)
     return Grip(times, x0, d0, q0), Grip(times, x1 + base, d1, q1)
+
+
+def _director(rope: Rope, nominal: Array, d: Array) -> Array:
+    """(knots, 3) as `Grip.from_markers` has it; or of a wrist that keeps an axis level, and rolls as it leans aside."""
+    across = any_across(nominal)
+    if not rope.wrist:
+        return carried(across, nominal, d)
+    level = across - (d @ across)[:, None] * d
+    level /= np.linalg.norm(level, axis=1, keepdims=True)
+    roll = rope.wrist * np.arcsin(d @ np.cross(nominal, across))[:, None]
+    return np.asarray(np.cos(roll) * level + np.sin(roll) * np.cross(d, level))
 
 
 def _wander(rng: np.random.Generator, times: Array, nominal: Array) -> tuple[Array, Array]:

@@ -13,7 +13,7 @@ FINE = tuple(range(1, 41))  # modes that hold the step between a connector and t
 
 
 def laboratory(seed: int = 7) -> list[Rope]:
-    """Three ropes, each a nasty one without an unseen roll, and with something else that recordings do not tell.
+    """Four ropes, each a nasty one without an unseen roll, and with something else that recordings do not tell.
 
     1. It was stored on a drum: a rest curvature of 3/m about one axis, which differs by 15 % from recording to
        recording. Its stiffness differs by up to 10 % either way, as the room warms up. Markers sit 5 to 7 mm beside the
@@ -21,8 +21,9 @@ def laboratory(seed: int = 7) -> list[Rope]:
     2. It slips through its grips by 3 mm each in every recording, and connectors stiffen its ends.
     3. The grips' markers come 15 ms late. Six frames of each recording of `train` are lost, and six repeat the one
        before.
+    4. Its grips are wrists of robots that keep an axis level and roll by 0.4 rad for each rad that they lean aside.
     """
-    _, second, third, fourth, _ = ropes(seed, nasty=True)
+    _, second, third, fourth, fifth = ropes(seed, nasty=True)
     return [
         replace(
             marked(_with(fourth, curvature_1_0=3.0, curvature_2_0=0.0), fourth.markers, seed, (5e-3, 7e-3)),
@@ -32,6 +33,7 @@ def laboratory(seed: int = 7) -> list[Rope]:
         ),
         replace(_sleeved(third), name="rope_2", extra_roll=0.0, weighed=True, slip=3e-3),
         replace(second, name="rope_3", late=0.015, lost=6, repeated=6),
+        replace(fifth, name="rope_4", wrist=0.4),
     ]
 
 

@@ -8,8 +8,8 @@ FOLDER/rope_1.json with the true values. A recording depends on the seed, its ro
 
 With --nasty the ropes have what real ones showed (`true_ropes`), some training files are spoiled (`spoil`), every other
 rope is written as lists of lists of numbers, and the JSON also tells what the true values miss of the eval recordings.
-With --strange it writes four ropes of which the recipe has no model (`strange`), with --laboratory three that change,
-slip or lose time as those of a laboratory do (`laboratory`).
+With --strange it writes four ropes of which the recipe has no model (`strange`), with --laboratory four that change,
+slip, roll or lose time as those of a laboratory do (`laboratory`).
 """
 
 from __future__ import annotations

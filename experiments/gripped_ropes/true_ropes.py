@@ -39,6 +39,7 @@ class Rope:
         warming: share by which its stiffness differs between recordings at most, as temperature changes it.
         slip: m, by which it slides out of each grip or into it at some time of a recording.
         late: s, by which the markers of the grips lag behind the others.
+        wrist: rad by which each grip rolls for each rad that it leans aside, beside keeping an axis level; 0 = neither.
         lost, repeated: frames of a recording that are lost, and that repeat the frame before.
     """
 
@@ -60,6 +61,7 @@ class Rope:
     warming: float = 0.0
     slip: float = 0.0
     late: float = 0.0
+    wrist: float = 0.0
     lost: int = 0
     repeated: int = 0
 

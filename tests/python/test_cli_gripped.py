@@ -20,7 +20,7 @@ from commands import last_line, run
 from sheetbend.cli import gripped
 from sheetbend.config import GrippedConfig, gripped_schema, parse, parse_any
 from sheetbend.gripped import LADDER, GrippedMotion, trades
-from sheetbend.gripped.ladder import BESIDE, CLOCK, MARKERS, REST, SHIFTS, TILTS, TWIST, VARYING, YIELD
+from sheetbend.gripped.ladder import BESIDE, CLOCK, MARKERS, REST, ROLLS, SHIFTS, TILTS, TWIST, VARYING, YIELD
 from sheetbend.report.fit_result import FitResult
 from sheetbend.result.estimate import Correlation, Estimate
 
@@ -471,7 +471,7 @@ class TestTrades:
 
 def test_the_rungs_of_the_configuration_are_those_of_the_recipe() -> None:
     assert tuple(gripped.RUNGS) == gripped_schema.RUNGS
-    assert tuple(LADDER) == (TWIST, TILTS, REST, VARYING, YIELD, CLOCK, BESIDE, SHIFTS, MARKERS)
+    assert tuple(LADDER) == (TWIST, TILTS, REST, VARYING, YIELD, ROLLS, CLOCK, BESIDE, SHIFTS, MARKERS)
     assert tuple(gripped.RUNGS.values()) == tuple(LADDER)
 
 

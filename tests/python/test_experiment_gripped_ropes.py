@@ -16,7 +16,7 @@ import pytest
 import sheetbend as sb
 from sheetbend.gripped import GrippedMotion, RopeModel
 from sheetbend.gripped.start import started
-from sheetbend.objects.grip import Grip
+from sheetbend.objects.grip import Grip, any_across
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "gripped_ropes"
 SECONDS, FRAMES = 1.0, 100
@@ -230,7 +230,7 @@ class TestLaboratory:
         assert share["curvature_1_0"] == pytest.approx(share["curvature_2_3"]) and share["curvature_1_0"] != 1.0
 
     def test_connectors_make_the_ends_stiffer(self, script: ModuleType) -> None:
-        _, sleeved, _ = script.laboratory(7)
+        _, sleeved, *_ = script.laboratory(7)
         plain = script.ropes(7, nasty=True)[2]
 
         def stiffness(rope: object, s: float) -> float:
@@ -239,6 +239,18 @@ class TestLaboratory:
 
         for s, times in ((0.02, 4.0), (0.5, 1.0), (0.98, 4.0)):
             assert stiffness(sleeved, s) / stiffness(plain, s) == pytest.approx(times, rel=0.2)  # a step as a series
+
+    def test_wrists_roll_as_they_lean(self, script: ModuleType) -> None:
+        wrist = script.laboratory(7)[3]
+        level, plain = (script.motion(replace(wrist, wrist=by), np.random.default_rng(1), 1.5) for by in (1e-9, 0.0))
+        rolled = script.motion(wrist, np.random.default_rng(1), 1.5)
+        for flat, carried, grip, nominal in zip(level, plain, rolled, script.NOMINAL, strict=True):
+            base = any_across(nominal)
+            across = np.cross(flat.direction, flat.director)
+            assert np.abs(across @ base).max() < 1e-8 and np.abs(carried.director - flat.director).max() > 0.02
+            leans = np.arcsin(np.clip(flat.direction @ np.cross(nominal, base), -1.0, 1.0))
+            angle = np.arctan2((grip.director * across).sum(axis=1), (grip.director * flat.director).sum(axis=1))
+            np.testing.assert_allclose(angle, 0.4 * leans, atol=1e-7)
 
     def test_grips_come_late_and_frames_are_lost_or_repeat(self, script: ModuleType) -> None:
         rope = replace(script.laboratory(7)[2], late=0.02)

@@ -14,7 +14,7 @@ from ..config import GrippedConfig, GrippedRopeSection
 from ..errors import ConfigError, RecordingError, SceneError, SheetbendError
 from ..files.whole import write_text
 from ..gripped import WITHOUT_TWIST, GrippedMotion, RopeFit, RopeReport, Rung, Screened, evaluate, fit_rope, screened
-from ..gripped.ladder import AND, BESIDE, CLOCK, MARKERS, REST, SHIFTS, TILTS, TWIST, VARYING, YIELD
+from ..gripped.ladder import AND, BESIDE, CLOCK, MARKERS, REST, ROLLS, SHIFTS, TILTS, TWIST, VARYING, YIELD
 from ..gripped.model import NAME
 from ..gripped.report import overview
 from ..objects.chain import unit_vector
@@ -35,6 +35,7 @@ RUNGS: dict[str, Rung] = {
     "rest": REST,
     "varying": VARYING,
     "yield": YIELD,
+    "rolls": ROLLS,
     "clock": CLOCK,
     "beside": BESIDE,
     "shifts": SHIFTS,

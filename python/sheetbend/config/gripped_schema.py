@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
@@ -12,8 +12,8 @@ from ..minimum.starts import MOST
 from .schema import ExperimentSection, OutputSection
 from .section import MOST_LINKS, Finite, Name, Pair, Section, Vector, key
 
-RungName = Literal["twist", "tilts", "rest", "varying", "yield", "clock", "beside", "shifts", "markers"]
-RUNGS: tuple[RungName, ...] = ("twist", "tilts", "rest", "varying", "yield", "clock", "beside", "shifts", "markers")
+RungName = Literal["twist", "tilts", "rest", "varying", "yield", "rolls", "clock", "beside", "shifts", "markers"]
+RUNGS: tuple[RungName, ...] = get_args(RungName)
 RECIPE = {name: option.default for name, option in inspect.signature(fit_rope).parameters.items()}
 
 
@@ -90,10 +90,10 @@ class GrippedRopeSection(Section):
     rungs: list[RungName] = key(
         list(RUNGS),
         "what the model gets, one after another: straight with twist, tilts of the grips, rest curvature, a stiffness "
-        "that varies along the rope, yield, by how much the grips are recorded later than the other markers, how far "
-        "the markers sit beside the rope's axis, places of the grips beside their markers, places of the markers along "
-        "the rope; a rung stays only if it predicts most recordings better that it was not fitted to, and no worse "
-        "those that it was",
+        "that varies along the rope, yield, by how much the grips roll about the rope as they lean, by how much the "
+        "grips are recorded later than the other markers, how far the markers sit beside the rope's axis, places of "
+        "the grips beside their markers, places of the markers along the rope; a rung stays only if it predicts most "
+        "recordings better that it was not fitted to, and no worse those that it was",
         min_length=1,
     )
     validate_share: Finite = key(

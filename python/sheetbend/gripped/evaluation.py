@@ -13,6 +13,7 @@ from .model import NAME
 from .motion import Array, GrippedMotion
 from .recipe import RopeFit
 from .screening import screened
+from .slips import slips, slips_said
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,7 @@ class Evaluation:
         predicted: of each (frames, markers, 3) m.
         scores: their errors beside the no-physics blend; None where nothing was predicted to its end.
         diverged: names of the recordings whose prediction was not finite, or went farther off than the rope is long.
-        notes: on recordings that were mended or left out.
+        notes: on recordings that were mended or left out, or in which the rope slips.
     """
 
     recordings: tuple[Recording, ...]
@@ -38,7 +39,8 @@ def evaluate(found: RopeFit, recordings: Sequence[Recording | GrippedMotion]) ->
     """Predict each recording open loop from its first frame, and score it (`sheetbend.scores`).
 
     Recordings are screened first; motions are taken as they are. Shape and speed at the start, and what had slid inside
-    a rope that yields, come from the first `smoothing` s of the model (`fit_rope`).
+    a rope that yields, come from the first `smoothing` s of the model (`fit_rope`). The notes name recordings in which
+    the rope slips in a grip, which no prediction knows.
     """
     usable = screened(recordings, found.model.smoothing)
     reach = found.values[f"{NAME}_length"]
@@ -52,4 +54,5 @@ def evaluate(found: RopeFit, recordings: Sequence[Recording | GrippedMotion]) ->
         else:
             diverged.append(recording.name)
     scored = scores(kept, predicted) if kept else None
-    return Evaluation(tuple(kept), tuple(predicted), scored, tuple(diverged), usable.notes)
+    notes = (*usable.notes, *(words for motion in usable for words in slips_said(motion, slips(motion))))
+    return Evaluation(tuple(kept), tuple(predicted), scored, tuple(diverged), notes)

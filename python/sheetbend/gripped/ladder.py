@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, fields, replace
 from ..quantities.parameters import Parameter
 from .model import NAME, RopeModel
 from .motion import GrippedMotion
+from .rolls import ORDERS
 
 TURN = 2.0 * math.pi
 
@@ -145,6 +146,12 @@ YIELD = Rung(
     ),
     starts=({"yield_curvature": 1.0, "yield_share": 0.5, "EI": 1.5},),
 )
+ROLLS = Rung(
+    "grips that roll as they lean",
+    options={"rolls": True},
+    parameters=tuple(_plain(f"{end}_roll_{order}", "rad", 0.5, 0.3) for end in ("start", "end") for order in ORDERS),
+    small=True,
+)
 CLOCK = Rung("clock of the grips", late=True)
 BESIDE = Rung("markers beside the rope", beside=True)
 SHIFTS = Rung(
@@ -160,4 +167,4 @@ MARKERS = Rung(
     each_marker=(_plain("place_{}", "m", 0.005, 0.005),),
     small=True,
 )
-LADDER = (TWIST, TILTS, REST, VARYING, YIELD, CLOCK, BESIDE, SHIFTS, MARKERS)
+LADDER = (TWIST, TILTS, REST, VARYING, YIELD, ROLLS, CLOCK, BESIDE, SHIFTS, MARKERS)

@@ -18,6 +18,7 @@ from ..recording.recording import Recording
 from ..recording.windows import Window
 from ..scene.scene import Scene
 from .motion import Array, GrippedMotion
+from .rolls import add_rolls
 
 NAME = "rope"
 GRAVITY = (0.0, 0.0, -9.81)
@@ -33,6 +34,7 @@ class RopeModel:
             share them share their material frames.
         values: starting values of quantities, as options of `add_rod` (EI, GJ, bend_damping, ...); None = without it.
         tilts, shifts, roll: nuisances of the grips, see `add_rod`.
+        rolls: let each grip roll as it leans, see `add_rolls`.
         curvature_modes, softness_modes, density_modes, slid_modes: see `add_rod`.
         places: let each free marker stand off from its measured place along the rope, by the quantity
             `rope_place_<its number>`, m.
@@ -56,6 +58,7 @@ class RopeModel:
     tilts: bool = False
     shifts: bool = False
     roll: bool = True
+    rolls: bool = False
     curvature_modes: Sequence[int] = ()
     softness_modes: Sequence[int] = ()
     density_modes: Sequence[int] = ()
@@ -92,7 +95,8 @@ class RopeModel:
         points, velocity = motion.start(first)
         options: dict[str, Any] = {k: v for k, v in self.values.items() if v is not None}
         length = options.pop("length", motion.length)
-        add_rod(
+        grips = motion.grip(False, frames, self.nominal[0]), motion.grip(True, frames, self.nominal[1])
+        rod = add_rod(
             scene,
             NAME,
             length=length,
@@ -100,8 +104,8 @@ class RopeModel:
             density=self.density,
             points=points,
             velocity=velocity,
-            start=motion.grip(False, frames, self.nominal[0]),
-            end=motion.grip(True, frames, self.nominal[1]),
+            start=grips[0],
+            end=grips[1],
             tilts=self.tilts,
             shifts=self.shifts,
             roll=self.roll,
@@ -111,6 +115,8 @@ class RopeModel:
             slid_modes=self.slid_modes,
             **options,
         )
+        if self.rolls:
+            add_rolls(scene, rod, grips, self.nominal, f"{NAME}_roll" if self.roll else None)
         scene.boundary.smoothed = motion.steadied
         if self.places:
             for k in motion.free:

@@ -64,10 +64,9 @@ class GrippedMotion:
         recording, positions = _bridged(recording)
         x, v = smoothed(recording.times, positions, smoothing)
         part = slice(inner[0], inner[1] + 1)
-        chords = mean_position(np.linalg.norm(np.diff(x, axis=1), axis=2))
+        chords = chords_of(x)
         _check_shown(recording, x, chords, inner)
-        s = np.concatenate([[0.0], np.cumsum(chords)])
-        fractions = (s - s[inner[0]]) / (s[inner[1]] - s[inner[0]])
+        fractions = fractions_of(chords, inner)
         seen = np.isfinite(x[:, part, 0]).sum(axis=1)
         best = np.flatnonzero(seen == seen.max())
         some = best[np.linspace(0, len(best) - 1, min(len(best), 20)).astype(int)]
@@ -154,6 +153,17 @@ class GrippedMotion:
 def motions_of(recordings: Sequence[Recording | GrippedMotion], smoothing: float) -> list[GrippedMotion]:
     """Motions of recordings, smoothed over so many s; those that are motions already stay as they are."""
     return [r if isinstance(r, GrippedMotion) else GrippedMotion.of(r, smoothing) for r in recordings]
+
+
+def chords_of(positions: Array) -> Array:
+    """(markers - 1,) m, mean distances of neighbors in (frames, markers, 3)."""
+    return mean_position(np.linalg.norm(np.diff(positions, axis=1), axis=2))
+
+
+def fractions_of(chords: Array, inner: tuple[int, int]) -> Array:
+    """(markers,) `GrippedMotion.fractions`."""
+    s = np.concatenate([[0.0], np.cumsum(chords)])
+    return np.asarray((s - s[inner[0]]) / (s[inner[1]] - s[inner[0]]))
 
 
 def _bridged(recording: Recording) -> tuple[Recording, Array]:

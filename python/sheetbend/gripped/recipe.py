@@ -33,8 +33,10 @@ from .model import GRAVITY, NAME, RopeModel, nominal_directions, shared_gravity
 from .motion import Array, GrippedMotion, motions_of
 from .over_density import UNIT, as_quantities, named_over_density, over_density, said_over_density
 from .plausible import doubts, gravities
+from .rolls import rolls_said
 from .screening import screened
 from .search import Say, Search
+from .slips import held, slips, slips_said
 from .start import started
 from .steps import Step
 from .windows import SPANS, Span, everything
@@ -164,10 +166,13 @@ def fit_rope(
     if density is None:
         say = said_over_density(say)
     usable = screened(recordings, smoothing)
-    motions = usable.motions
+    slipped = [slips(m) for m in usable]
+    motions = [held(m, found) for m, found in zip(usable, slipped, strict=True)]
+    told_slips = [words for m, found in zip(usable, slipped, strict=True) for words in slips_said(m, found)]
+    notes = (*usable.notes, *told_slips)
     told = shared_gravity([m.recording for m in motions])
     meant = (gravity,) if gravity is not None else (GRAVITY,) if told is not None else gravities(motions)
-    for note in usable.notes:
+    for note in notes:
         say(note)
     for doubt in doubts(motions, meant[-1]):
         say(f"doubtful: {doubt}")
@@ -208,10 +213,11 @@ def fit_rope(
     assert climb.rope is not None
     rope, values = climb.rope, {**found.values, **found.on_mesh}  # of the model's own mesh
     warnings = (
-        *usable.notes,
+        *notes,
         *doubts(motions, rope.model.gravity),
         *_found_gravity(rope.model, meant),
         *_found_late(climb.late),
+        *([rolls_said(NAME, kept, rope.model.nominal, values)] if rope.model.rolls else []),
         *climb.search.left_out,
         *at_bounds(rope.parameters, values, rope.model, kept, last[0]),
         *_short_links(rope.model, values),

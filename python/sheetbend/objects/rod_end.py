@@ -159,13 +159,41 @@ def spread_roll(scene: Scene, roll: str, directors: Array, shares: Array) -> Non
         directors: (k,) at their places without roll.
         shares: (k,) of the quantity `roll`.
     """
+    axes = _turning_axes(scene, directors)
+    for power in range(1, SERIES + 1):
+        weight = (-1) ** (power // 2) / math.factorial(power) * shares**power
+        _turn_start(scene, directors, weight[:, None] * axes[power % 2], _power(roll, power))
+
+
+def spread_turn(scene: Scene, turn: str, weights: Array, directors: Array, roll: str | None, shares: Array) -> None:
+    """Turn frames further by a small angle, to first order, beside their shares of a roll.
+
+    Args:
+        turn: quantity.
+        weights: (k,) of the angle, rad, in that quantity.
+        directors: (k,) at their places without roll.
+        roll: quantity; None = there is none.
+        shares: (k,) of it.
+    """
+    axes = _turning_axes(scene, directors)
+    for power in range(SERIES + 1 if roll else 1):  # the derivative of the series of `spread_roll`
+        weight = (-1) ** ((power + 1) // 2) / math.factorial(power) * shares**power * weights
+        factors = ((turn, "identity"), *(_power(roll, power) if roll else ()))
+        _turn_start(scene, directors, weight[:, None] * axes[(power + 1) % 2], factors)
+
+
+def _turning_axes(scene: Scene, directors: Array) -> tuple[Array, Array]:
+    """(k, 3) each: the directors, and the axes across them and their edges."""
     edges = np.array([scene.directors[int(d)][:2] for d in directors])
     x = scene.nodes
     along = x[edges[:, 1]] - x[edges[:, 0]]
-    first, second = x[directors], np.cross(along / np.linalg.norm(along, axis=1, keepdims=True), x[directors])
+    return x[directors], np.cross(along / np.linalg.norm(along, axis=1, keepdims=True), x[directors])
+
+
+def _power(quantity: str, power: int) -> tuple[tuple[str, str], ...]:
+    return ((quantity, "identity"),) * (power % 2) + ((quantity, "square"),) * (power // 2)
+
+
+def _turn_start(scene: Scene, directors: Array, by: Array, factors: tuple[tuple[str, str], ...]) -> None:
     index = (3 * np.asarray(directors)[:, None] + np.arange(3)).ravel()
-    for power in range(1, SERIES + 1):
-        weight = (-1) ** (power // 2) / math.factorial(power) * shares**power
-        axis = second if power % 2 else first
-        factors = ((roll, "identity"),) * (power % 2) + ((roll, "square"),) * (power // 2)
-        scene.add_terms([Term("position", index, (weight[:, None] * axis).ravel(), factors)])
+    scene.add_terms([Term("position", index, by.ravel(), factors)])
