@@ -329,8 +329,8 @@ def test_places_on_a_cloth_count_along_both_directions() -> None:
 def test_what_is_not_told_is_refused(recording: sb.Recording) -> None:
     for given, message in (
         ({"rope_EI": 0.1}, r"given\.rope_EI: is nothing that this fit takes as given .*rope_density.*markers"),
-        ({"rope_density": -0.1}, r"given\.rope_density: must be positive"),
-        ({"gravity": math.nan}, r"given\.gravity: must be positive"),
+        ({"rope_density": -0.1}, r"given\.rope_density: must not be negative"),
+        ({"gravity": math.nan}, r"given\.gravity: must not be negative"),
     ):
         with pytest.raises(sb.InputError, match=message):
             fit(hanging(), recording, given=given)

@@ -460,9 +460,11 @@ class TestConclusion:
     def test_the_time_of_many_windows_is_told_also_of_one_recording(self) -> None:
         said: list[str] = []
         windows = ((0.5, 1.0), (0.06, 0.96))
-        fit_rope(
+        found = fit_rope(
             [shown("only")], density=0.06, ladder=[TWIST], bending_lengths=(0.3,), windows=windows, say=said.append
         )
+        rests_on = {p.name: p.sd for p in found.fit.result.premises}
+        assert rests_on["rope_density"] > 0.0 and "mass of each marker" not in rests_on  # which the density's error has
         (at,) = (k for k, text in enumerate(said) if text.startswith("the fit that counts, to 16 windows of 0.06 s"))
         assert said[at + 1].startswith("which takes about ")
 

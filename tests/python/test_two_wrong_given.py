@@ -20,7 +20,10 @@ from test_wrong_given import TIMES, asked
     ("gravity", "words"),
     [
         ((0.0, 0.0, -9.7), "rope_length were 0.5 % more and gravity were 1.1 % larger"),
-        ((-0.17, 0.0, -9.8085), "rope_length were 0.49 % more and gravity were turned by 1 degrees toward x"),
+        (
+            (-0.17, 0.0, -9.8085),
+            "rope_length were 0.49 % more and gravity were turned by 1 degrees toward x (a draft looks alike)",
+        ),
     ],
 )
 def test_two_wrong_numbers_are_named_together(gravity: tuple[float, ...], words: str) -> None:

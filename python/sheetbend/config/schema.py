@@ -222,14 +222,15 @@ class GivenSection(Section):
     """How uncertain a number is that the fit takes as given. One table each: [given.NAME], NAME being a quantity that
     is not fitted, "gravity", "clamp_direction" or "collider_direction" (directions, rad), "clamps", "markers",
     "marker_offset" (from a rope's axis) or "drive_place" (places, m), "recording_delay" (s), "marker_mass" (of each
-    that the model does not have, kg), "gravity_size", "recording_clock" (its frame rate), "recording_size" or
-    "drive_size" (how far what drives the scene moves; relative)."""
+    that the model does not have, kg), "draft" (velocity of the air along each axis, m/s), "gravity_size",
+    "recording_clock" (its frame rate), "recording_size" or "drive_size" (how far what drives the scene moves;
+    relative)."""
 
     sd: Finite = key(
         ...,
         "standard deviation, which then counts in the intervals: relative for what must be positive (0.02 is 2 %), "
-        "else in the quantity's unit",
-        gt=0,
+        "else in the quantity's unit; 0 is exact",
+        ge=0,
     )
 
 

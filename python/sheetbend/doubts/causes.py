@@ -35,7 +35,7 @@ BY_CHANCE = 4.0
 """Of the residuals' sum of squares, in the noise's variance: by so much, chance tells two numbers apart. The other one
 is named beside."""
 MOST_NAMED = 3
-FARTHEST = {"rad": 0.3, "m": 0.1, "s": 0.1, "": 0.7}
+FARTHEST = {"rad": 0.3, "m": 0.1, "s": 0.1, "m/s": 2.0, "": 0.7}
 """Largest errors that are told, by unit; "" for relative ones. First order says nothing of larger ones."""
 
 

@@ -53,9 +53,9 @@ def check_given(given: Mapping[str, float], problem: FitProblem) -> None:
         if name not in known:
             fix = f"name some of: {', '.join(known)}"
             raise InputError(f"given.{name}", "is nothing that this fit takes as given", name, fix)
-        if not (is_number(sd) and sd > 0):
-            fix = "give a standard deviation: relative where positive (0.02 is 2 %), else in SI units"
-            raise InputError(f"given.{name}", "must be positive", sd, fix)
+        if not (is_number(sd) and sd >= 0):
+            fix = "give a standard deviation: relative where positive (0.02 is 2 %), else in SI units; 0 is exact"
+            raise InputError(f"given.{name}", "must not be negative", sd, fix)
 
 
 def premises(problem: FitProblem, u: Array, given: Mapping[str, float], told: Sequence[Told]) -> tuple[Premise, ...]:
@@ -66,14 +66,14 @@ def premises(problem: FitProblem, u: Array, given: Mapping[str, float], told: Se
         given: standard deviations by name: of quantities that must be positive relative to the value, of others in
             their unit; "gravity" (each of two directions), "clamp_direction" and "collider_direction" (each
             axis) in rad, "clamps" (each axis), "markers" (each marker) and "drive_place" (each axis) in m; others of
-            `told.GROUPS`.
+            `told.GROUPS`. What is exact (0) is left out.
         told: `told_numbers` there.
     """
     errors: dict[str, _Errors] = {}
     _, _, J = problem.evaluate_exactly(u)
     rows = problem.core.first_rows
     for one in told:
-        if one.name:
+        if one.name and given.get(one.name) != 0.0:
             mine = J[rows[one.experiment] : rows[one.experiment + 1]][one.rows]
             errors.setdefault(one.name, _Errors(one)).add(
                 one.label, mine.T @ one.column, float(one.column @ one.column)

@@ -24,6 +24,8 @@ from ..objects.markers import Place
 from ..quantities.quantities import Quantity
 from ..quantities.wording import short
 from ..recording.recording import Recording
+from ..scene.air import WIND
+from .draft import drafts
 from .marker_mass import MOST_EACH, marker_load, unseen_mass
 from .tangents import Input, tangents
 
@@ -44,6 +46,7 @@ GROUPS: Mapping[str, tuple[str, tuple[float, str]]] = {
     "recording_size": ("", (5e-3, "0.5 %")),
     "drive_size": ("", (0.01, "1 %")),
     "drive_place": ("m", STEPS["m"]),
+    "draft": ("m/s", (0.2, "0.2 m/s")),  # of which people in a room hardly feel anything
     "marker_offset": ("m", STEPS["m"]),
     "marker_mass": ("kg", (MOST_EACH, f"{short(1e3 * MOST_EACH)} g each")),
 }
@@ -51,6 +54,7 @@ GROUPS: Mapping[str, tuple[str, tuple[float, str]]] = {
 relative) and step."""
 SIZE, LATER, SLOWER, LARGER = "size of gravity", "frames later", "clock", "size of the recording"
 FARTHER, ASIDE = "path of the drive", "place of the drive"
+DRAFT = "draft along"
 WEIGHTS, BESIDE = "mass of each marker", "offset of markers"
 _NONE = np.zeros(0)
 
@@ -141,10 +145,13 @@ def _collect(
     path, weights = _path(e, inputs), _weights(e, inputs)
     made += [(1.0, Told(i, "drive_size", FARTHER, *GROUPS["drive_size"], _NONE, relative=True)) for _ in path]
     made += [(1.0, Told(i, "marker_mass", label, "kg", step, _NONE)) for label, (step, _) in weights.items()]
+    blown, moves = drafts(problem, u, i, inputs)
+    blows = {f"{DRAFT} {AXES[axis]}": more for axis, more in enumerate(moves)}
+    made += [(1.0, Told(i, "draft", label, *GROUPS["draft"], _NONE)) for label in blows]
     by_gravity: dict[int, Array] = {}
     if made:
         loads = {label: load for label, (_, load) in weights.items()}
-        columns = tangents(problem, u, i, names | size | turns | path | loads, asked, corrected)
+        columns = tangents(blown, u, i, names | size | turns | path | loads | blows, asked, corrected)
         for (weight, one), column in zip(made, columns.T, strict=True):
             yield replace(one, column=weight * column)
         by_gravity = {axis: columns[:, len(asked) + n] for n, axis in enumerate(toward)}
@@ -155,6 +162,8 @@ def _step(q: Quantity, value: float, log: bool) -> tuple[bool, float, str] | Non
     """Whether the step of a told quantity is relative, the step, and the step in words; None where none makes sense."""
     if log:
         return True, 0.01, "1 %"
+    if q.name in WIND:
+        return (False, *GROUPS["draft"][1])
     if q.unit in STEPS:
         return (False, *STEPS[q.unit])
     if value != 0.0 and q.scale is None:

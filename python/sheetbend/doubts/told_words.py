@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
-from .told import ASIDE, BESIDE, DEGREE, FARTHER, LARGER, LATER, MILLIMETER, SIZE, SLOWER, Told
+from .told import ASIDE, BESIDE, DEGREE, DRAFT, FARTHER, LARGER, LATER, MILLIMETER, SIZE, SLOWER, Told
 
 
 def words_of(one: Told, more: float, problem: FitProblem, group: Sequence[int]) -> str:
@@ -33,7 +33,10 @@ def words_of(one: Told, more: float, problem: FitProblem, group: Sequence[int]) 
     if one.label == LARGER:
         return f"the recording{of} were {size} too {'small' if more < 0 else 'large'} (its scale)"
     if one.name == "gravity":
-        return f"gravity were turned by {short(abs(more) / DEGREE, 2)} degrees {_way(one.label, more)}"
+        alike = " (a draft looks alike)" if e.scene.has_drag else ""
+        return f"gravity were turned by {short(abs(more) / DEGREE, 2)} degrees {_way(one.label, more)}{alike}"
+    if one.label.startswith(DRAFT):
+        return f"the air moved at {short(abs(more), 2)} m/s along {axis}"
     if one.name == "clamp_direction":
         return f"the clamps{of} and all with them were turned by {short(abs(more) / DEGREE, 2)} degrees about {axis}"
     if one.label.startswith(ASIDE):

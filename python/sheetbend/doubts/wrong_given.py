@@ -202,6 +202,8 @@ def _directions(
     some."""
     rows, first, others = problem.core.rows, problem.core.first_rows, set(held_names(problem)) - set(losses)
     others |= {"marker_mass"}  # which is asked among what the model lacks
+    if any(one.name == "gravity" for one in told):
+        others |= {"draft"}  # which pushes like a gravity that is turned
     within = [one for one in told if one.experiment in group and one.name not in others]
     apart = len(within) * rows <= LONGEST
     each: dict[str, tuple[Told, Array]] = {}

@@ -146,10 +146,11 @@ def fit(
             - in rad: "gravity" (its direction), "clamp_direction" and "collider_direction" (each about each axis);
             - in m: "clamps", "markers", "marker_offset" (from a rope's axis), "drive_place";
             - in s: "recording_delay"; in kg: "marker_mass" (of each marker that has no mass in the model);
+            - in m/s: "draft" (the velocity of the air along each axis);
             - relative: "gravity_size", "recording_clock" (its frame rate), "recording_size", "drive_size" (how far the
               scene is driven).
 
-            `FitResult.premises` holds the effect of each given value in any case.
+            0 says that a value is exact. `FitResult.premises` holds the effect of each given value in any case.
         smooth: fields of stiffness (`stiffness_modes` of a cloth or a solid of clusters) to fit with a smoothness
             prior, by name, such as {"toy_stiffness": sb.Smooth()}. What `Smooth` leaves open, the size and the length
             of the prior, is found from the recordings (`FitResult.fields`).

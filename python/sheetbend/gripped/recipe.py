@@ -42,7 +42,7 @@ from .steps import Step
 from .windows import SPANS, Span, everything
 
 BENDING_LENGTHS = (0.45, 0.25, 0.12)  # m, of the starts: (EI/(density g))^(1/3), stiff first
-DENSITY = f"{NAME}_density"
+DENSITY, MARKERS = f"{NAME}_density", "marker_mass"
 MARKERS_UNKNOWN = 0.08  # of the rope's mass, standard deviation of that of markers of which nothing is known
 LINKS_PER_BENDING_LENGTH = 3.0  # below this EI reads too high and GJ too low
 
@@ -204,7 +204,7 @@ def fit_rope(
         say(f"interrupted: going back to {next(s.name for s in reversed(climb.steps) if s.stays)}")
     kept = climb.search.whole
     last = everything(kept, spans[-1][0]) if isinstance(windows, str) else spans[-1]
-    sds = dict(given or {})
+    sds = {MARKERS: 0.0, **(given or {})}  # which the model has, or the density
     if marker_mass is None:
         sds[DENSITY] = math.hypot(sds.get(DENSITY, 0.0), MARKERS_UNKNOWN)
     found, spread = conclude(climb, kept, last, sds, interrupted)
