@@ -104,6 +104,30 @@ def test_what_is_measured_at_the_limit_is_not_moved_from_it():
     assert 0 < abs(found.moved) < 0.1 * found.half_width
 
 
+def test_a_drag_that_a_long_substep_takes_for_its_own_comes_back():
+    """At 5 ms backward Euler damps more than the air does. The fit said "at a bound", with a drag of at most 0.0052."""
+
+    def rope(drag: float) -> sb.Scene:
+        return sb.rope(0.5, 6, density=0.05, EI=2e-3, drag_linear=drag, clamp_start=(1, 0, 0))
+
+    times, watched_at = np.arange(61) / 100, (2, 4, 6)
+    fine = sb.Solver(h=1 / 3200, integrator="bdf1", extrapolate=2)
+    x = sb.simulate(rope(0.01), times, fine).positions[:, watched_at]
+    x += 1e-3 * np.random.default_rng(0).standard_normal(x.shape)
+    e = sb.Experiment(
+        scene=rope(0.013),
+        recording=sb.Recording(positions=x, times=times, name="rope"),
+        markers=[sb.on_particle(k) for k in watched_at],
+        solver=sb.Solver(h=1 / 200, integrator="bdf1"),
+        sigma=1e-3,
+    )
+    found = sb.fit(e, parameters=["rope_EI", "rope_drag_linear"], beginnings=False)
+    for name, true in (("rope_EI", 2e-3), ("rope_drag_linear", 0.01)):
+        assert found[name].lower < true < found[name].upper < 1.1 * true
+    assert found["rope_drag_linear"].moved == approx(found["rope_drag_linear"].value, rel=1e-4)
+    assert any("went to a limit at the substep of the fit" in words for words in found.result.warnings)
+
+
 def test_sweeps_that_have_not_converged_are_a_floor():
     """The stiffness that 3 sweeps can show is far above what is fitted, and still they are read as the fabric's."""
     recording = recorded(1 / 240)

@@ -67,7 +67,8 @@ def judged_parameters(
         refitter: optimizer of profiles; without one the intervals are the linear ones.
         lost: `without_verdict`; what is fitted apart from these is judged without them.
         fitted: the problem as it was fitted and its minimum, where the estimate was moved from there to the limit of
-            short substeps. Profiles ask that problem and move along: combined runs would take three times as long.
+            short substeps. Profiles ask that problem and move along: combined runs would take three times as long. They
+            are asked themselves where they were searched (`Settled.searched`).
     """
     if lost:
         return _beside(problem, u, lost, refined, systematic, refitter)

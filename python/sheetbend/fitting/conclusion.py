@@ -107,8 +107,9 @@ def conclude(
         more[parameter] = more.get(parameter, 0.0) + half_width
     values = problem.parameters.to_physical(at.u)
     refined = to_the_limit(at.refits, problem.parameters, values)
+    profiled = (at.problem, at.u) if at.searched else (problem, best.u)
     judged, lower = judged_parameters(
-        at.problem, at.u, refined, more, refitter if asked.profiles else None, lost, (problem, best.u)
+        at.problem, at.u, refined, more, refitter if asked.profiles else None, lost, profiled
     )
     judged = at_floor_of_sweeps(_moved(judged, at.moved), at.refits)
     if refitter is not None and asked.profiles and not lost:

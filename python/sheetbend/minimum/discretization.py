@@ -84,7 +84,7 @@ def settled(
     found = Settled(problem, end.u)
     if refinement.halve_step and any(not e.static for e in problem.experiments):
         if end.converged:
-            found = settle(problem, end.u)
+            found = settle(problem, end.u, optimizer)
         else:
             missing = (f"{TIME_STEP} not counted: the fit did not converge", *missing)
     refits, failed, warnings = refined_estimates(refinement, experiments, problem, end.u, found.u, optimizer)

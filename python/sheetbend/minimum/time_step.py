@@ -14,14 +14,19 @@ import numpy as np
 
 from ..errors import SheetbendError
 from ..experiment.experiment import Experiment
+from ..quantities.parameters import RESTS
 from ..result.result import Refit
+from ..statistics.least_squares import solved, unexplained
 from .linear_step import gauss_newton, moves, one_step, residuals_there
+from .optimizers import refit
 from .problem import FitProblem
 from .refuted import refuted, words
 
 TIME_STEP, SWEEPS = "time step", "twice the sweeps"
 TANGENTS = 3  # evaluations with tangents at most
 THERE = 0.1  # standard errors, in the mean of all parameters: a step shorter than this has arrived
+APART = 0.5  # standard errors, by which the limit wants a parameter elsewhere
+SEARCHED, TOLERANCE = 50, 1e-8  # of a search of combined runs: iterations at most, and relative change of the cost
 SECOND_ORDER, THIRD_ORDER = 4.0 / 3.0, 8.0 / 7.0  # from what a halving moves to the limit
 
 
@@ -35,7 +40,8 @@ class Settled:
         moved: by how much, of each free parameter, in its unit; empty where nothing was moved.
         refits: what of the time step is left to count.
         not_counted: why nothing of it is, where it is not.
-        warnings: where the data speak against a limit.
+        warnings: where the data speak against a limit, or a parameter came back in it.
+        searched: whether combined runs were fitted, because the first fit had left parameters at a limit.
     """
 
     problem: FitProblem
@@ -44,6 +50,7 @@ class Settled:
     refits: tuple[Refit, ...] = ()
     not_counted: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    searched: bool = False
 
     @property
     def cost(self) -> float:
@@ -51,12 +58,17 @@ class Settled:
         return 0.5 * float(np.sum(self.problem.evaluate(self.u)[1] ** 2))
 
 
-def settle(problem: FitProblem, u: np.ndarray) -> Settled:
-    """Count the time step of a fit at its minimum u. Ctrl-C passes through."""
+def settle(problem: FitProblem, u: np.ndarray, optimizer: str = "auto") -> Settled:
+    """Count the time step of a fit at its minimum u. Ctrl-C passes through.
+
+    Args:
+        optimizer: of a search of combined runs.
+    """
     try:
         if all(map(can_be_combined, problem.experiments)):
             try:
-                return _moved(problem, u)
+                limit = problem.of(combined(problem.experiments))
+                return _back(problem, limit, u, _moved(problem, limit, u), optimizer)
             except SheetbendError:  # a run at a fourth of the substep may have no answer where one at half has
                 pass
         return _counted_whole(problem, u)
@@ -79,8 +91,7 @@ def combined(experiments: Sequence[Experiment]) -> list[Experiment]:
     ]
 
 
-def _moved(problem: FitProblem, u: np.ndarray) -> Settled:
-    limit = problem.of(combined(problem.experiments))
+def _moved(problem: FitProblem, limit: FitProblem, u: np.ndarray) -> Settled:
     there = residuals_there(problem, limit, u)  # raises where the combination has no answer at u
     _, r, J = problem.evaluate(u)
     first = gauss_newton(problem.parameters, u, J, there - r)
@@ -105,10 +116,47 @@ def _moved(problem: FitProblem, u: np.ndarray) -> Settled:
             break  # what that step would move counts as open
     if refuted(problem, u, r):
         return _stays(problem, u, end)
+    return Settled(limit, end, moves(problem.parameters, u, end), (_left(problem, limit, end, onward),))
+
+
+def _left(problem: FitProblem, limit: FitProblem, end: np.ndarray, onward: np.ndarray) -> Refit:
+    """What the limit leaves open at its minimum: what half the substep moves, and the step that was not taken."""
     finest = problem.of(combined(halved(problem.experiments)))
     left = np.abs(order_left(problem.experiments) * (one_step(limit, finest, end) - end)) + np.abs(onward - end)
-    rest = Refit(name=TIME_STEP, to_limit=1.0, moved=moves(problem.parameters, end, end + left))
-    return Settled(limit, end, moves(problem.parameters, u, end), (rest,))
+    return Refit(name=TIME_STEP, to_limit=1.0, moved=moves(problem.parameters, end, end + left))
+
+
+def _back(problem: FitProblem, limit: FitProblem, u: np.ndarray, found: Settled, optimizer: str) -> Settled:
+    """Where a fit of combined runs ends, if the fit at u left parameters at a limit of its search and the combined runs
+    want them elsewhere; else what was found."""
+    lower, upper = problem.parameters.limits()
+    lost = (u - lower < RESTS) | (upper - u < RESTS)
+    if not lost.any() or not _wanted_elsewhere(problem, u, limit, found.u, np.flatnonzero(lost)):
+        return found
+    end = refit(limit, np.where(lost, problem.parameters.initial(), found.u), optimizer, SEARCHED, TOLERANCE)
+    if not end.cost < found.cost:
+        return replace(found, searched=found.problem is limit)
+    _, r, J = limit.evaluate(end.u)
+    left = _left(problem, limit, end.u, gauss_newton(problem.parameters, end.u, J, r))
+    told = (
+        f"{', '.join(np.array(problem.parameters.free)[lost])} went to a limit at the substep of the fit, which "
+        "combined runs at this substep and half of it do not confirm. So these were fitted, and intervals come from "
+        "them. Use a shorter substep"
+    )
+    return Settled(limit, end.u, moves(problem.parameters, u, end.u), (left,), warnings=(told,), searched=True)
+
+
+def _wanted_elsewhere(
+    problem: FitProblem, u: np.ndarray, limit: FitProblem, at: np.ndarray, columns: Iterable[int]
+) -> bool:
+    """Whether the Gauss-Newton steps of a fit at u and of the limit there, both without bounds, differ in one of these
+    parameters by a good part of its standard error."""
+    _, r, J = problem.evaluate(u)
+    _, there, K = limit.evaluate(at)
+    apart = solved(K, there) - solved(J, r)
+    noise = np.sqrt(there @ there / max(len(there) - len(u), 1))
+    own = {k: unexplained(np.delete(K, k, axis=1), K[:, k]) for k in columns}
+    return any(float(np.linalg.norm(apart[k] * column)) > APART * noise for k, column in own.items())
 
 
 def _arrived(problem: FitProblem, r: np.ndarray, J: np.ndarray, step: np.ndarray) -> bool:
