@@ -135,6 +135,11 @@ class Experiment:
         return None if self.static or self.is_cloud else recorded_noise(self.recording.piece(self.t0, None), markers)
 
     @property
+    def has_unknowns(self) -> bool:
+        """Whether a fit solves for numbers of it on the way: its start, or the motion of what drives it."""
+        return self.driven_sigma is not None or self.start == "estimated"
+
+    @property
     def is_cloud(self) -> bool:
         """Whether the recording is a cloud, whose points are compared with the closest points of the scene's cloths."""
         return isinstance(self.recording, Cloud)

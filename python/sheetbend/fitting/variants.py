@@ -76,7 +76,7 @@ def _arc_of(place: Place, arc: dict[int, float]) -> float | None:
 def _with_sensor(e: Experiment) -> Experiment:
     """A force sensor at the particles that are held; the same experiment where it cannot have one."""
     held = e.scene.held
-    if e.static or e.forces or e.driven_sigma is not None or not held:
+    if e.static or e.forces or e.has_unknowns or not held:
         return e
     times = e.recording.times[e.recording.times > e.t0]
     if len(times) == 0:

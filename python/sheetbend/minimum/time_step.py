@@ -80,7 +80,7 @@ def can_be_combined(e: Experiment) -> bool:
     """Whether runs at several substeps give a limit: errors of a known order, iterations that converge, and one run so
     far."""
     solver = e.solver
-    return e.static or (solver.extrapolate == 1 and solver.knows_order(e.scene.compiled) and e.driven_noise is None)
+    return e.static or (solver.extrapolate == 1 and solver.knows_order(e.scene.compiled) and not e.has_unknowns)
 
 
 def combined(experiments: Sequence[Experiment]) -> list[Experiment]:
