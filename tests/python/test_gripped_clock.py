@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sheetbend.gripped import GrippedMotion, RopeReport, fit_rope
+import sheetbend as sb
+from sheetbend.gripped import GrippedMotion, RopeReport, evaluate, fit_rope
 from sheetbend.gripped.climb import Climb
 from sheetbend.gripped.clock import lateness
 from sheetbend.gripped.judging import predict
 from sheetbend.gripped.ladder import CLOCK, TWIST
 from sheetbend.gripped.search import Search
+from sheetbend.gripped.slips import Slip
 from sheetbend.gripped.steps import Rope
 from sheetbend.report.scores import coordinate_error
 from test_gripped_motion import carried_about, model_of
@@ -52,7 +54,8 @@ def unseen() -> GrippedMotion:
     return recorded(LATE, 9, "unseen")
 
 
-def test_a_fit_predicts_with_earlier_grips_and_says_so(unseen: GrippedMotion) -> None:
+def test_a_fit_predicts_with_earlier_grips_and_says_so(unseen: GrippedMotion, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And of a slip in an unseen recording."""
     twist = replace(TWIST, parameters=tuple(p for p in TWIST.parameters if p.name in ("rope_EI", "rope_length")))
     motions = [recorded(LATE, k, f"{k}") for k in range(4)]
     spans = ((0.5, 1.0), (1.0, 3.0))
@@ -65,6 +68,9 @@ def test_a_fit_predicts_with_earlier_grips_and_says_so(unseen: GrippedMotion) ->
     assert less < 0.5 * error
     assert any("ms after the others" in words for words in found.warnings)
     assert RopeReport("arch", found).to_dict()["grips_late"] == found.model.late
+    monkeypatch.setattr(sb.gripped.evaluation, "slips", lambda motion: (Slip(end=True, by=-2e-3, time=0.4),))
+    (note,) = evaluate(found, [unseen]).notes
+    assert note.startswith("unseen: the rope slips by 2 mm into its end grip about 0.4 s")
 
 
 def test_ctrl_c_in_the_fit_leaves_the_grips_as_they_were(monkeypatch: pytest.MonkeyPatch) -> None:
