@@ -67,17 +67,6 @@ void expect_constraints_around_volumes(const Scene& scene) {
                                     volume.name + " is in no constraint. Fix: use gauss_seidel, or give it a skin");
 }
 
-// What yields has no place in a balance yet.
-void expect_balanced(const Scene& scene) {
-  for (const Group& group : scene.groups)
-    with_kind(group.kind, [&]<class K>(K) {
-      if constexpr (Yields<K>)
-        throw std::invalid_argument(
-            "solver.method: group " + group.name +
-            " yields or slides, for which implicit substeps are not made. Fix: use direct or newton");
-    });
-}
-
 }  // namespace
 
 void check_solver(const Scene& scene, const SolverOptions& options) {
@@ -86,12 +75,10 @@ void check_solver(const Scene& scene, const SolverOptions& options) {
     expect_no_unilateral(scene);
     expect_constraints_around_volumes(scene);
   }
-  if (options.partition == Partition::implicit) {
-    expect_balanced(scene);
+  if (options.partition == Partition::implicit)
     expect_no_volume(scene);
-  } else {
+  else
     expect_no_contact(scene);
-  }
   if (scene.keeps_spin && options.partition != Partition::direct)
     throw std::invalid_argument(
         "solver.method: bodies keep their spin in direct alone. Fix: use direct, or leave their spin out");
