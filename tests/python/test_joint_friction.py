@@ -94,6 +94,21 @@ def test_gradients_are_exact(method: str, integrator: str) -> None:
 
 
 @pytest.mark.parametrize("method", ["direct", "implicit"])
+def test_lanes_have_the_bits_of_single_scenes(method: str) -> None:
+    """Of motions and gradients; one of the hinges sticks while others slide."""
+    compiled = pendulum(rate=1.0, friction=0.1)[0].compiled
+    core, steps = sb.Solver(h=2e-3, method=method).core(compiled), [10, 40]
+    inputs = np.stack([compiled.inputs(compiled.values({"hinge_friction": f})) for f in (0.02, 0.1, 1.0)])
+    together = core.simulate_batch(inputs, steps, 0.0)
+    bar = np.ones_like(together)
+    gradients = core.vjp_batch(inputs, steps, bar, 0.0)
+    for own, states, states_bar, found in zip(inputs, together, bar, gradients, strict=True):
+        assert np.array_equal(core.states(own, steps, 0.0), states)
+        _, tape = core.record(own, steps, 0.0)
+        assert np.array_equal(core.vjp(own, tape, steps, states_bar, 0.0), found)
+
+
+@pytest.mark.parametrize("method", ["direct", "implicit"])
 def test_a_wheel_stops_and_stays(method: str) -> None:
     friction, rate = 0.1, 5.0
     scene, joint = pendulum(rate=rate, gravity=0.0, friction=friction)

@@ -209,10 +209,11 @@ def test_gradients_with_respect_to_what_had_flowed():
         assert forward != 0.0 and reverse == approx(forward, rel=1e-9)
 
 
-def test_a_short_tape_and_threads_have_the_same_bits():
+@pytest.mark.parametrize("method", ["newton", "implicit"])
+def test_a_short_tape_and_threads_have_the_same_bits(method):
     """Of the motion and of every gradient, with few states kept and with two threads."""
     times, weights = np.arange(11) / 100, np.random.default_rng(1)
-    solver, scene = sb.Solver(h=2e-3, method="newton"), falling((4, 1, 1))
+    solver, scene = sb.Solver(h=2e-3, method=method), falling((4, 1, 1))
     plan = sb.tape_plan(scene, times, solver)
     tight = sb.tape_plan(scene, times, replace(solver, memory=plan.least))
     assert tight.recomputed > 0
