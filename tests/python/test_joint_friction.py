@@ -56,6 +56,14 @@ def test_it_sticks_where_the_weight_is_less() -> None:
     assert 0.02 - end == approx(slip * WEIGHT * math.sin(end) / friction, rel=1e-3)
 
 
+def test_at_rest_it_bears_its_torque_beside_a_spring() -> None:
+    scene = sb.Scene("bar")
+    bar = scene.add_body("bar", mass=MASS, inertia=[OWN] * 3, center=(CENTER, 0.0, 0.0))
+    joint = sb.hinge(None, bar, at=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0), friction=0.5, stiffness=0.2)
+    angle = float(joint.angle(sb.equilibrium(scene).nodes))
+    assert WEIGHT * math.cos(angle) == approx(0.5 + 0.2 * angle, rel=1e-12)
+
+
 def test_two_bodies_swing_as_two_arms_with_the_same_numbers() -> None:
     numbers = {"mass": MASS, "first_moment": MASS * CENTER, "inertia": MOMENT, "length": 0.3}
     arms = sb.Scene("arms")
