@@ -78,9 +78,9 @@ concept HasHessian = requires(const double* in, double* out) { K::add_hessian(in
 template <class K>
 inline constexpr bool Yields = requires { K::yield_parameter; };
 
-// Kinds that a balance of forces can have (core/solver/implicit_block.h): those that always hold, and have no set.
+// Kinds that a balance of forces can have (core/solver/implicit_block.h): those that always hold.
 template <class K>
-inline constexpr bool balances = !K::unilateral && !Yields<K>;
+inline constexpr bool balances = !K::unilateral;
 
 // Numbers of the lower triangle of a symmetric matrix of n rows, row after row.
 constexpr int triangle(int n) { return n * (n + 1) / 2; }

@@ -1,16 +1,8 @@
-// friction_hinge: dry friction about a fixed unit normal; a torsion spring that slides. With e = theta - set, theta the angle of hinge.h,
-//
-//   C = e where |e| <= y,   C = sign(e) sqrt(y (2 |e| - y)) beyond   [rad],
-//
-// so the energy C^2/(2 alpha) is quadratic up to y and grows linearly from there (Huber 1964): the torque C dC/de / alpha is e/alpha while the
-// joint sticks and y/alpha, the torque of Coulomb's friction, while it slides. The balance at the end of a substep decides which, so that the
-// torque depends neither on the rate nor on the substep. The set, the first number of the stencil's last node, then follows the angle at the
-// distance y (yield.h): elastic and perfectly plastic, what Dahl's law (1968) becomes for its largest exponents.
-// Compliance alpha in rad/(N m), the parameter `yield` is y: alpha = y/T for the torque T. A compliance of zero never slides and is refused at
-// validation. Solvers that take a fixed number of iterations ask for a friction that stops nothing within a substep, h^2 T/inertia < y.
+// friction_hinge: dry friction (dry_friction.h) about a fixed unit normal. The angle from the set is theta of hinge.h less the set  [rad].
 // Degenerate: as hinge.
 #pragma once
 
+#include "core/constraints/dry_friction.h"
 #include "core/constraints/hinge.h"
 
 namespace sheetbend {
@@ -38,7 +30,7 @@ struct FrictionHinge : AngleFromSet {
   static constexpr const char* about =
       "the angle of a hinge from the one it slid to, which is the x of the last particle (pinned)";
   static constexpr Unit unit = units::radians;
-  static constexpr Compliance compliance{"yield angle / torque", Compliance::scalar, "would never slide"};
+  static constexpr Compliance compliance = yield_over_torque;
   static constexpr bool hot = true;
   static constexpr int yield_parameter = 3;
   using Slider = AngleFromSet;
@@ -47,13 +39,7 @@ struct FrictionHinge : AngleFromSet {
   static void evaluate(const T* x, const T* p, T* C, T* J) {
     T e;
     AngleFromSet::evaluate(x, p, &e, J);
-    const T zero(0.0), one(1.0), y = p[yield_parameter];
-    const T size = select(e > zero, e, -e);
-    const auto slides = size > y;
-    const T root = sqrt(select(slides, y * (size + size - y), one));
-    const T slope = select(slides, y / root, one);
-    C[0] = select(slides, select(e > zero, root, -root), e);
-    for (int d = 0; d < dofs; ++d) J[d] = slope * J[d];
+    slide_dry<dofs>(e, p[yield_parameter], C, J);
   }
 };
 

@@ -19,6 +19,7 @@
 #include "core/constraints/hinge.h"
 #include "core/constraints/isometric_bending.h"
 #include "core/constraints/joint_angle.h"
+#include "core/constraints/joint_friction.h"
 #include "core/constraints/joint_stops.h"
 #include "core/constraints/material_curvature.h"
 #include "core/constraints/neo_hookean.h"
@@ -71,6 +72,7 @@ using Registry = std::tuple<   //
     DirectionsAcross,          //
     Along,                     //
     JointAngle,                //
+    JointFriction,             //
     AngleStop,                 //
     SlideStop,                 //
     BrickStrain,               //

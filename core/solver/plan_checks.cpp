@@ -79,17 +79,6 @@ void expect_constraints_around_volumes(const Scene& scene) {
                                     volume.name + " is in no constraint. Fix: use gauss_seidel, or give it a skin");
 }
 
-// What yields has no place in a balance yet.
-void expect_balanced(const Scene& scene) {
-  for (const Group& group : scene.groups)
-    with_kind(group.kind, [&]<class K>(K) {
-      if constexpr (Yields<K>)
-        throw std::invalid_argument(
-            "solver.method: group " + group.name +
-            " yields or slides, for which implicit substeps are not made. Fix: use direct or newton");
-    });
-}
-
 }  // namespace
 
 void check_solver(const Scene& scene, const SolverOptions& options) {
@@ -99,7 +88,6 @@ void check_solver(const Scene& scene, const SolverOptions& options) {
     expect_constraints_around_volumes(scene);
   }
   if (options.partition == Partition::implicit) {
-    expect_balanced(scene);
     expect_no_volume(scene);
   } else {
     expect_no_self_contact(scene);

@@ -81,6 +81,8 @@ WHOLE: dict[str, Any] = {
                 "servo": {"times": [0.0], "values": [0.0]},
                 "torque": {"times": [0.0], "values": [0.1]},
                 "rotor": 1e-5,
+                "friction": 1e-3,
+                "slip_angle": 1e-3,
                 "limits": [-1.0, 1.0],
                 "limit_stiffness": 10.0,
                 "limit_damping": 0.1,

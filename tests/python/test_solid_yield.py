@@ -173,7 +173,7 @@ def flowed(scene: sb.Scene) -> np.ndarray:
     return scene.group("bar_strain")[0].particles[:, 8:]
 
 
-SOLVERS = ("newton", "newton_cg", "direct", "gauss_seidel")
+SOLVERS = ("newton", "newton_cg", "direct", "gauss_seidel", "implicit")
 
 
 @pytest.mark.parametrize("integrator", ["bdf1", "bdf2"])
@@ -209,10 +209,11 @@ def test_gradients_with_respect_to_what_had_flowed():
         assert forward != 0.0 and reverse == approx(forward, rel=1e-9)
 
 
-def test_a_short_tape_and_threads_have_the_same_bits():
+@pytest.mark.parametrize("method", ["newton", "implicit"])
+def test_a_short_tape_and_threads_have_the_same_bits(method):
     """Of the motion and of every gradient, with few states kept and with two threads."""
     times, weights = np.arange(11) / 100, np.random.default_rng(1)
-    solver, scene = sb.Solver(h=2e-3, method="newton"), falling((4, 1, 1))
+    solver, scene = sb.Solver(h=2e-3, method=method), falling((4, 1, 1))
     plan = sb.tape_plan(scene, times, solver)
     tight = sb.tape_plan(scene, times, replace(solver, memory=plan.least))
     assert tight.recomputed > 0
@@ -267,6 +268,42 @@ def test_a_pressed_block_tells_modulus_and_yield_stress():
         assert fit[name].verdict == "identified", name
 
 
+# --- contact
+
+
+def column(layers: int, pressure: float, gap: float = 0.0) -> tuple[sb.Scene, sb.Solid, np.ndarray, np.ndarray]:
+    """A column that is pressed onto a smooth table, and which of its vertices are at the bottom and on top."""
+    scene = sb.Scene("column", gravity=(0.0, 0.0, 0.0))
+    mesh = sb.mesh.bricks((0.02, 0.02, 0.04), (1, 1, layers))
+    numbers = {"density": 1000.0, "E": E, "poisson": NU, "yield_stress": STRESS, "hardening": HARDENING}
+    solid = sb.add_solid(scene, mesh, "clay", **numbers)
+    z = mesh.vertices[:, 2]
+    low, top = z < z.min() + 1e-9, z > z.max() - 1e-9
+    scene.contact(solid.particles[low], sb.Plane((0.0, 0.0, float(z.min()) - gap), name="table"), friction=0.0)
+    scene.add_force(solid.particles[top], [[0.0, 0.0, -pressure * 0.02**2 / 4]] * 4)
+    return scene, solid, low, top
+
+
+def test_a_column_on_a_table_is_pressed_together():
+    """By sigma/E and (sigma - sigma_y)/H per length."""
+    scene, solid, low, top = column(2, 3 * STRESS)
+    solver = sb.Solver(h=0.02, method="implicit", integrator="bdf1")
+    x = sb.simulate(scene, [0.0, 2.0], solver).positions[:, solid.particles, 2]
+    sunk = x[0] - x[1]
+    exact = 0.04 * (3 * STRESS / E + 2 * STRESS / HARDENING)
+    assert sunk[top].mean() - sunk[low].mean() == approx(exact, rel=5e-3)
+
+
+@pytest.mark.parametrize("integrator", ["bdf1", "bdf2"])
+def test_gradients_beside_a_contact(integrator):
+    scene = column(2, 20 * STRESS, 1e-4)[0]
+    solver = sb.Solver(h=2e-3, method="implicit", integrator=integrator)
+    report = sb.check_gradients(scene, [0.0, 0.01, 0.02], solver, samples=3)
+    assert report.passed, str(report)
+    rows = {row.name: row for row in report.rows}
+    assert not rows["clay_yield_stress"].unfelt and not rows["clay_hardening"].unfelt
+
+
 # --- what a person gives
 
 REFUSED = {
@@ -300,9 +337,7 @@ def test_tetrahedra_are_refused():
         sb.solid(tetrahedra, density=1000.0, E=1e4, poisson=0.4, yield_stress=30.0)
 
 
-def test_implicit_and_extrapolation_refuse_it_by_name():
-    with pytest.raises(sb.InputError, match=r"bar_strain yields or slides.*Fix: use direct or newton"):
-        sb.simulate(falling(), [0.0, 0.01], sb.Solver(method="implicit"))
+def test_extrapolation_refuses_it_by_name():
     with pytest.raises(sb.InputError, match="yield_stress"):
         sb.simulate(falling(), [0.0, 0.01], sb.Solver(method="newton", extrapolate=2))
 

@@ -44,8 +44,6 @@ def falling_cloth(**options: float) -> sb.Scene:
 
 def test_cloth_that_yields_may_touch():
     scene = falling_cloth(yield_curvature=5.0, yield_share=0.5)
-    with pytest.raises(ValueError, match="yields or slides"):
-        sb.simulate(scene, 0.01, sb.Solver(h=1e-3, method="implicit"))
     motion = sb.simulate(scene, [0.0, 0.1], swept(1e-3, 10))
     away = np.linalg.norm(motion.positions[-1], axis=1)
     assert away.min() > 0.101 - 1e-5

@@ -6,14 +6,16 @@ from typing import Literal, Self
 
 from pydantic import model_validator
 
+from ..objects.pivot import SLIP_ANGLE
 from .section import Finite, Line, Name, Quaternion, Section, Vector, key
 
 GROUND = "ground"
 TILT = ("tilt_stiffness", "tilt_damping")
+DRY = ("friction", "slip_angle")
 LIMITS = ("limits", "limit_stiffness", "limit_damping", "limit_depth")
 JOINTS: dict[str, tuple[str, ...]] = {
     "ball": ("compliance",),
-    "hinge": ("axis", "rate", "stiffness", "rest", "viscosity", "servo", "torque", "rotor", *LIMITS, *TILT),
+    "hinge": ("axis", "rate", "stiffness", "rest", "viscosity", "servo", "torque", "rotor", *DRY, *LIMITS, *TILT),
     "universal": ("axes",),
     "slider": ("axis", "rate", *LIMITS),
     "cylinder": ("axis", "rate", "turn_rate"),
@@ -96,6 +98,8 @@ class JointSection(Section):
     stiffness: Finite | None = key(None, "of a hinge's spring: <name>_stiffness", "N m/rad", gt=0)
     rest: Finite = key(0.0, "the angle at which that spring rests, counted from the start: <name>_rest", "rad")
     viscosity: Finite | None = key(None, "of a hinge, torque over rate: <name>_viscosity", "N m s/rad", gt=0)
+    friction: Finite | None = key(None, "of a hinge, dry: <name>_friction, Coulomb's torque", "N m", gt=0)
+    slip_angle: Finite = key(SLIP_ANGLE, "how far a hinge with dry friction gives before it slides", "rad", gt=0)
     servo: Knots | None = key(
         None, "the angles that a hinge has, or its spring rests at: { times = [...], values = [...] }", "s, rad"
     )

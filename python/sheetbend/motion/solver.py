@@ -140,7 +140,7 @@ class Solver:
         """The compiled solver for a scene, or what is called as it is and combines several.
 
         Raises:
-            InputError: the method cannot step the scene, such as "implicit" with what yields.
+            InputError: the method cannot step the scene, such as "implicit" with a kept volume.
 
         Warns:
             RedundantConstraintsWarning: some rigid constraints follow from others at the start; "gauss_seidel" leaves

@@ -1,9 +1,10 @@
-"""What turns a hinge or resists it: a torsion spring, viscosity, a servo, or the torque of a motor over time; and how
-stiffly it holds its axis.
+"""What turns a hinge or resists it: a torsion spring, viscosity, dry friction, a servo, or the torque of a motor over
+time; and how stiffly it holds its axis.
 
-All but the last are the constraint `joint_angle`, whose dial is the x of a hidden node: pinned at zero for a spring,
-driven for a servo. The dial of a motor is free: the rotor, an axis with inertia and no weight, which turns with the
-joint and on which the torque acts.
+Spring, viscosity, servo and motor are the constraint `joint_angle`, whose dial is the x of a hidden node: pinned at
+zero for a spring, driven for a servo. The dial of a motor is free: the rotor, an axis with inertia and no weight, which
+turns with the joint and on which the torque acts. That of dry friction (`joint_friction`) is the angle at which the
+hinge sticks.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from ..quantities.expression import Expression
 from ..quantities.quantities import Term
 from ..scene.scene import Array
 from .joint_making import Making
+from .pivot import check_friction
 
 Knots = tuple[ArrayLike, ArrayLike]  # times (knots,) s and values (knots,)
 MOST_NAMED = 50  # knots of a torque that are quantities
@@ -51,11 +53,9 @@ def add_motor(made: Making, torque: Knots | None, rotor: float | None) -> None:
     scene, name = made.scene, made.name
     dial = scene.add_rotor(name)
     scene.add_quantity(f"{name}_rotor", float(rotor), "kg m^2")  # type: ignore[arg-type]
-    rate = ((f"{name}_rate", "identity"),) if f"{name}_rate" in scene.quantities else ()
-    angle = ((f"{name}_angle", "identity"),) if rate else ()
     scene.add_terms([Term("mass", dial, 1.0, ((f"{name}_rotor", "identity"),))])
-    if rate:
-        scene.add_terms([Term("position", 3 * dial, 1.0, angle), Term("velocity", 3 * dial, 1.0, rate)])
+    _start(made, "position", dial, "angle")
+    _start(made, "velocity", dial, "rate")
     _angle(made, "motor", dial, None, 0.0, None)
     if torque is None:
         return
@@ -67,6 +67,18 @@ def add_motor(made: Making, torque: Knots | None, rotor: float | None) -> None:
         for k, value in enumerate(values):
             quantity = scene.add_quantity(f"{name}_torque_{k}", float(value), "N m", positive=False, scale=size)
             scene.forces.add_term(dial, k, 0, quantity)
+
+
+def add_friction(made: Making, friction: float | None, slip_angle: float) -> None:
+    """Dry friction: a spring that slides, and sticks at the angle at the start."""
+    if friction is None:
+        return
+    check_friction(made.name, friction, slip_angle)
+    (stuck,) = made.scene.add_hidden(np.zeros((1, 3)), 1.0, pinned=True)
+    _start(made, "position", int(stuck), "angle")
+    weights, nodes = _turn(made, int(stuck))
+    group = made.constrain("joint_friction", "dry", nodes, [[*weights, slip_angle]], np.ones(1))
+    made.name_stiffness(group, f"{made.name}_friction", friction, "N m", slip_angle)
 
 
 def hold_axis(made: Making, stiffness: float | None, damping: float | None) -> None:
@@ -86,6 +98,18 @@ def hold_axis(made: Making, stiffness: float | None, damping: float | None) -> N
         made.name_damping(group, f"{made.name}_tilt_damping", damping, "N m s/rad")
 
 
+def _turn(made: Making, dial: int) -> tuple[list[Expression], list[list[int]]]:
+    """What the angle of a hinge from a dial is made of: the weights of its directions, and the stencil."""
+    (_, *a), (_, *b) = made.nodes
+    return [*made.direction(0, 1), *made.direction(0, 2), *made.direction(1, 1)], [[*a, *b, dial]]
+
+
+def _start(made: Making, array: str, dial: int, label: str) -> None:
+    """Let a dial start with the joint's own angle or rate, where it has one."""
+    if (quantity := f"{made.name}_{label}") in made.scene.quantities:
+        made.scene.add_terms([Term(array, 3 * dial, 1.0, ((quantity, "identity"),))])
+
+
 def _check(field: str, stiffness: float | None, loss_field: str, loss: float | None) -> None:
     """Refuse a stiffness that is not positive, and a loss that is negative."""
     if stiffness is not None and not (is_number(stiffness) and stiffness > 0.0):
@@ -103,15 +127,15 @@ def _angle(made: Making, label: str, dial: int, stiffness: float | None, rest: f
     zero: Expression | float = 0.0
     if stiffness is not None:
         zero = Expression.of(scene.add_quantity(f"{name}_rest", rest, "rad", positive=False, scale=0.1))
-    weights = [*made.direction(0, 1), *made.direction(0, 2), *made.direction(1, 1), zero]
-    (_, *a), (_, *b) = made.nodes
+    turn, nodes = _turn(made, dial)
+    weights = [*turn, zero]
     one, none = np.ones(1), np.zeros(1)
     damped = none if viscosity is not None else None
     if stiffness is None and viscosity is not None:
-        group = made.constrain("joint_angle", label, [[*a, *b, dial]], [weights], viscosity=none)
+        group = made.constrain("joint_angle", label, nodes, [weights], viscosity=none)
     else:
         compliance = None if stiffness is None else one
-        group = made.constrain("joint_angle", label, [[*a, *b, dial]], [weights], compliance, damped)
+        group = made.constrain("joint_angle", label, nodes, [weights], compliance, damped)
     if stiffness is not None:
         made.name_stiffness(group, f"{name}_stiffness", stiffness, "N m/rad")
     if viscosity is not None:

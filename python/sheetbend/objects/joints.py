@@ -15,7 +15,8 @@ from ..errors import SceneError
 from ..scene.body import Body
 from .joint_limits import add_limits
 from .joint_making import Joint, Making
-from .joint_spring import Knots, add_motor, add_servo, add_spring, hold_axis
+from .joint_spring import Knots, add_friction, add_motor, add_servo, add_spring, hold_axis
+from .pivot import SLIP_ANGLE
 
 
 def ball(
@@ -51,6 +52,8 @@ def hinge(
     stiffness: float | None = None,
     rest: float = 0.0,
     viscosity: float | None = None,
+    friction: float | None = None,
+    slip_angle: float = SLIP_ANGLE,
     servo: Knots | None = None,
     torque: Knots | None = None,
     rotor: float | None = None,
@@ -65,10 +68,10 @@ def hinge(
 
     Quantities: its place as of `ball`; `<name>_angle` rad and `<name>_rate` rad/s, the start of the lower body, which
     replace its own place, attitude, velocity and spin; with a spring `<name>_stiffness` N m/rad and `<name>_rest` rad;
-    with viscosity `<name>_viscosity` N m s/rad; with limits `<name>_limit_low`, `<name>_limit_high` and
-    `<name>_limit_depth` rad, `<name>_limit_stiffness` N m/rad, and `<name>_limit_damping` N m s/rad where given; of an
-    axis that gives way `<name>_tilt_stiffness` N m/rad and `<name>_tilt_damping` N m s/rad where given. The angle
-    counts from how the bodies were given.
+    with viscosity `<name>_viscosity` N m s/rad; with dry friction `<name>_friction` N m; with limits
+    `<name>_limit_low`, `<name>_limit_high` and `<name>_limit_depth` rad, `<name>_limit_stiffness` N m/rad, and
+    `<name>_limit_damping` N m s/rad where given; of an axis that gives way `<name>_tilt_stiffness` N m/rad and
+    `<name>_tilt_damping` N m s/rad where given. The angle counts from how the bodies were given.
 
     Args:
         upper, lower: the bodies; None is the ground.
@@ -78,6 +81,9 @@ def hinge(
         stiffness: of a torsion spring, N m/rad.
         rest: rad, the angle at which it rests.
         viscosity: torque over the rate, N m s/rad.
+        friction: dry friction, N m: Coulomb's torque, which does not depend on the rate. Where less would turn it, the
+            hinge sticks. Take substeps h with h^2 friction/inertia well below the slip angle.
+        slip_angle: rad, how far a hinge with dry friction gives elastically before it slides.
         servo: times (knots,) s and angles (knots,) rad. The hinge has this angle, or with a stiffness a spring that
             rests at it (`rest` is added).
         torque: times (knots,) s and torques (knots,) N m of a motor on the lower body, linear between and constant
@@ -105,6 +111,7 @@ def hinge(
         add_servo(made, servo, stiffness, rest, viscosity)
     else:
         add_spring(made, stiffness, rest, viscosity)
+    add_friction(made, friction, slip_angle)
     add_motor(made, torque, rotor)
     add_limits(made, "rad", limits, limit_stiffness, limit_damping, limit_depth)
     return made.joint()

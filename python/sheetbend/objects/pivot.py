@@ -7,7 +7,7 @@ On a fixed pivot the torque against the motion is
 Swings shrink linearly in time from the first (by 4 friction/stiffness per period, stiffness the restoring torque over
 the angle), exponentially from the second, and as 1/(t + const) from the third; a recording tells them apart where the
 amplitude falls by a good part. Dry friction is elastic up to a small slip angle and constant beyond
-(core/constraints/friction_hinge.h), so that the joint can come to rest off its balance, as real ones do.
+(core/constraints/dry_friction.h), so that the joint can come to rest off its balance, as real ones do.
 """
 
 from __future__ import annotations
@@ -63,11 +63,7 @@ def _viscous(scene: Scene, arm: Arm, before: int, viscosity: float) -> None:
 
 def _dry(scene: Scene, arm: Arm, carrier: Arm | None, before: int, friction: float, slip_angle: float) -> None:
     """A hinge that sticks at the initial angle between the two arms; about -y that angle grows as the arm's does."""
-    for field, value in (("friction", friction), ("slip_angle", slip_angle)):
-        if not (is_number(value) and math.isfinite(value) and value > 0.0):
-            raise SceneError(
-                f"{arm.name}.{field}", "must be positive", value, "give a positive number, or leave it out"
-            )
+    check_friction(arm.name, friction, slip_angle)
     (stuck,) = scene.add_hidden(np.zeros((1, 3)), 1.0, pinned=True)
     angles = [(1.0, arm)] if carrier is None else [(1.0, arm), (-1.0, carrier)]
     scene.add_terms([Term("position", 3 * int(stuck), sign, ((f"{a.name}_angle", "identity"),)) for sign, a in angles])
@@ -83,6 +79,13 @@ def _dry(scene: Scene, arm: Arm, carrier: Arm | None, before: int, friction: flo
     scene.groups[-1].compliance[:] = 0.0
     _, first, _ = scene.group(group)
     scene.add_terms([Term("compliance", first, slip_angle, ((quantity, "inverse"),))])
+
+
+def check_friction(name: str, friction: float, slip_angle: float) -> None:
+    """Refuse a dry friction or a slip angle that is not positive."""
+    for field, value in (("friction", friction), ("slip_angle", slip_angle)):
+        if not (is_number(value) and math.isfinite(value) and value > 0.0):
+            raise SceneError(f"{name}.{field}", "must be positive", value, "give a positive number, or leave it out")
 
 
 def _air(scene: Scene, arm: Arm, drag: float) -> None:

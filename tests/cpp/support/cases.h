@@ -432,6 +432,15 @@ inline Case case_of<JointAngle>() {
           .parameter_sign = std::vector<int>(10, 1)};
 }
 
+// Sliding: the angle from the set is about seven times the yield angle.
+template <>
+inline Case case_of<JointFriction>() {
+  Case row = case_of<JointAngle>();
+  row.x[18] = -0.2;  // the set
+  row.p.back() = 0.06;
+  return row;
+}
+
 // Beyond its range by less than the depth.
 template <>
 inline Case case_of<AngleStop>() {
