@@ -144,8 +144,9 @@ def fit(
             "gravity" (its direction), "clamp_direction" and "collider_direction" (of each about each axis) are in rad,
             "clamps", "markers", "marker_offset" (from a rope's axis) and "drive_place" in m, "recording_delay" in s,
             "marker_mass" (of each, which the model does not have) in kg, "draft" (velocity of the air along each axis)
-            in m/s, and relative are "gravity_size", "recording_clock" (its frame rate), "recording_size" and
-            "drive_size" (how far what drives the scene moves). What is exact has 0. What each of
+            in m/s; relative are "gravity_size", "recording_clock" (its frame rate), "recording_size" and "drive_size"
+            (how far what drives the scene moves). Of force sensors there are "force_size" (relative), "force_zero" in
+            N, "torque_zero" in N m, "force_direction" in rad and "force_delay" in s. What is exact has 0. What each of
             these numbers moves is in `FitResult.premises`.
         smooth: fields of stiffness (`stiffness_modes` of a cloth or a solid of clusters) that are fitted with a
             smoothness prior, by name, such as {"toy_stiffness": sb.Smooth()}. The size and the length of the prior are
