@@ -84,5 +84,7 @@ def test_drag_rests_on_still_air_as_much_as_a_fit_to_moving_air_says() -> None:
     problem, u = found(0.0)
     (along,) = (p for p in premises(problem, u, {"draft": 0.1}, told_numbers(problem, u)[0]) if p.name.endswith("z"))
     assert along.words == "0.2 m/s" and along.sd == 0.1 and along.off_by == 0.2
+    exact = premises(problem, u, {"draft": 0.0}, told_numbers(problem, u)[0])
+    assert exact and not any(p.name.startswith("draft") for p in exact)
     moved = 0.03 * np.expm1(found(0.02)[1][0] - u[0])
     assert moved == pytest.approx(-0.1 * along.moved["rope_drag_linear"], rel=0.03)

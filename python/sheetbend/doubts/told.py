@@ -27,6 +27,7 @@ from ..recording.recording import Recording
 from ..scene.air import WIND
 from .draft import drafts
 from .marker_mass import MOST_EACH, marker_load, unseen_mass
+from .sensor_errors import sensor_errors
 from .tangents import Input, tangents
 
 Rows = slice | NDArray[np.bool_]
@@ -48,6 +49,11 @@ GROUPS: Mapping[str, tuple[str, tuple[float, str]]] = {
     "drive_place": ("m", STEPS["m"]),
     "draft": ("m/s", (0.2, "0.2 m/s")),  # of which people in a room hardly feel anything
     "marker_offset": ("m", STEPS["m"]),
+    "force_size": ("", (0.01, "1 %")),
+    "force_direction": ("rad", STEPS["rad"]),
+    "force_delay": ("s", STEPS["s"]),
+    "force_zero": ("N", (0.0, "")),  # of each sensor its sigma
+    "torque_zero": ("N m", (0.0, "")),
     "marker_mass": ("kg", (MOST_EACH, f"{short(1e3 * MOST_EACH)} g each")),
 }
 """Told numbers that are no quantities, by the name under which a standard deviation is given: unit ("" where it is
@@ -155,6 +161,10 @@ def _collect(
         for (weight, one), column in zip(made, columns.T, strict=True):
             yield replace(one, column=weight * column)
         by_gravity = {axis: columns[:, len(asked) + n] for n, axis in enumerate(toward)}
+    for error in sensor_errors(problem, u, i):
+        unit = GROUPS[error.name][0]
+        one = Told(i, error.name, error.label, unit, error.step, error.column, relative=not unit)
+        yield replace(one, missing=error.says, signed=True)
     yield from _observe(problem, i, e, r, corrected, theta[slots[i]], by_gravity)
 
 

@@ -148,7 +148,9 @@ def fit(
             - in s: "recording_delay"; in kg: "marker_mass" (of each marker that has no mass in the model);
             - in m/s: "draft" (the velocity of the air along each axis);
             - relative: "gravity_size", "recording_clock" (its frame rate), "recording_size", "drive_size" (how far the
-              scene is driven).
+              scene is driven);
+            - of force sensors: "force_size" (relative), "force_zero" in N, "torque_zero" in N m, "force_direction" in
+              rad, "force_delay" in s.
 
             0 says that a value is exact. `FitResult.premises` holds the effect of each given value in any case.
         smooth: fields of stiffness (`stiffness_modes` of a cloth or a solid of clusters) to fit with a smoothness

@@ -1,0 +1,148 @@
+"""What errors of force sensors change of residuals: how much they read per newton, their zeros, how
+they stand, and their clocks.
+
+Readings enter the residuals as they are, so each of these changes them by what is known without derivatives. It is
+told from the simulated readings: measured ones hold noise, which a sensor that read nothing would explain. Which row
+belongs to which reading is asked once, with readings that are moved by a number of their own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays.timeseries import Array
+from ..experiment.force_sensor import ForceSensor
+from ..minimum.problem import FitProblem
+from ..quantities.wording import short
+
+Says = Callable[[float], str]
+
+
+@dataclass(frozen=True)
+class SensorError:
+    """One error of a sensor.
+
+    Attributes:
+        name, label: as those of `told.Told`.
+        step: the error whose effect a report tells, and that in words; "" for that of all such errors.
+        column: (rows of the experiment,) derivative of its residuals.
+        says: what a size of it says of the sensor.
+    """
+
+    name: str
+    label: str
+    step: tuple[float, str]
+    column: Array
+    says: Says
+
+
+@dataclass(frozen=True)
+class _Readings:
+    """Of a sensor and of one kind, (samples, 3) over sigma, and the axes that have no bias of their own."""
+
+    sensor: ForceSensor
+    values: Array
+    sigma: float
+    kind: str
+    zeros: str
+
+
+def sensor_errors(problem: FitProblem, u: Array, i: int) -> list[SensorError]:
+    """Of the sensors of the i-th experiment at u (free,); none where it has none, or has corrections. One simulation
+    without derivatives."""
+    e = problem.experiments[i]
+    if not e.forces or problem.estimates_corrections:
+        return []
+    measured = [each for sensor in e.forces for each in _readings(sensor)]
+    ends = np.cumsum([each.values.size for each in measured])
+    numbers = [end - each.values.size + np.arange(each.values.size) for end, each in zip(ends, measured, strict=True)]
+    numbered = replace(e, forces=_moved(e.forces, measured, numbers))
+    there = problem.of([numbered if k == i else other for k, other in enumerate(problem.experiments)])
+    own = slice(*problem.core.first_rows[i : i + 2])
+    _, r, _ = problem.evaluate(u, jacobian=False)
+    ok, more, _ = there.evaluate(u, jacobian=False)
+    if not ok:
+        return []
+    at = np.rint(r[own] - more[own]).astype(np.int64) - 1  # place among all readings, -1 of what is none
+    compared = at >= 0
+    simulated = np.concatenate([each.values.ravel() for each in measured])
+    simulated[at[compared]] += r[own][compared]
+    parts = np.split(simulated.reshape(-1, 3), ends[:-1] // 3)
+    measured = [replace(each, values=values) for each, values in zip(measured, parts, strict=True)]
+    found = []
+    for k, (end, each) in enumerate(zip(ends, measured, strict=True)):
+        first = end - each.values.size
+        for name, label, step, by, says in _errors(each):
+            every = np.zeros(ends[-1] + 1)
+            every[first:end] = np.nan_to_num(by.ravel())
+            if name == "force_size" and k + 1 < len(measured) and measured[k + 1].sensor is each.sensor:
+                every[end : ends[k + 1]] = np.nan_to_num(measured[k + 1].values.ravel())  # torques, by the same gauges
+            if not (e.static and name == "force_delay"):
+                found.append(SensorError(name, label, step, every[at], says))
+    return found
+
+
+def _readings(sensor: ForceSensor) -> Iterator[_Readings]:
+    recording = sensor.recording
+    yield _Readings(sensor, recording.forces / sensor.sigma, sensor.sigma, "force", "" if sensor.bias else sensor.axes)
+    if sensor.torque_sigma is not None and recording.torques is not None:
+        zeros = "" if sensor.torque_bias else sensor.torque_axes
+        yield _Readings(sensor, recording.torques / sensor.torque_sigma, sensor.torque_sigma, "torque", zeros)
+
+
+def _moved(
+    sensors: Sequence[ForceSensor], measured: Sequence[_Readings], numbers: Sequence[Array]
+) -> list[ForceSensor]:
+    """The sensors with readings that are larger by so many sigma and one."""
+    made = []
+    for sensor in sensors:
+        recording = sensor.recording
+        for each, n in zip(measured, numbers, strict=True):
+            if each.sensor is sensor:
+                values = each.sigma * (each.values + 1.0 + n.reshape(-1, 3))
+                recording = (
+                    replace(recording, forces=values) if each.kind == "force" else replace(recording, torques=values)
+                )
+        made.append(replace(sensor, recording=recording))
+    return made
+
+
+def _errors(each: _Readings) -> Iterator[tuple[str, str, tuple[float, str], Array, Says]]:
+    """Name, label, step, what one unit of it adds to (samples, 3) readings over sigma, and what a size of it says."""
+    name, unit = each.sensor.name, "N" if each.kind == "force" else "N m"
+    if each.kind == "force":
+        yield "force_size", f"size of {name}", (0.01, "1 %"), each.values, _reads(name)
+        if each.sensor.delay is None and len(each.values) > 1:
+            late = -np.gradient(each.values, each.sensor.recording.times, axis=0)
+            yield "force_delay", f"clock of {name}", (1e-3, "1 ms"), late, _late(name)
+        for axis, turn in zip("xyz", np.eye(3), strict=True):
+            step = math.radians(1.0), "1 degree"
+            yield "force_direction", f"{name} about {axis}", step, -np.cross(turn, each.values), _turned(name, axis)
+    for axis in each.zeros:
+        one = np.broadcast_to(np.eye(3)["xyz".index(axis)] / each.sigma, each.values.shape)
+        step = each.sigma, f"{short(each.sigma, 2)} {unit}"
+        yield f"{each.kind}_zero", f"{each.kind} zero of {name} along {axis}", step, one, _off(name, axis, unit)
+
+
+def _reads(name: str) -> Says:
+    return lambda size: f"{name} read {short(100 * abs(size), 2)} % too {'much' if size > 0 else 'little'}"
+
+
+def _late(name: str) -> Says:
+    return lambda size: f"{name} read {short(1e3 * abs(size), 2)} ms too {'late' if size > 0 else 'early'} (its clock)"
+
+
+def _turned(name: str, axis: str) -> Says:
+    return lambda size: (
+        f"{name} were turned by {short(math.degrees(abs(size)), 2)} degrees about {'' if size > 0 else '-'}{axis}"
+    )
+
+
+def _off(name: str, axis: str, unit: str) -> Says:
+    return lambda size: (
+        f"{name} read {short(abs(size), 2)} {unit} too {'much' if size > 0 else 'little'} along {axis} (its zero)"
+    )
