@@ -21,6 +21,7 @@ from sheetbend.fitting.fitted_motion import fitted_positions
 from sheetbend.minimum.linear_step import residuals_there
 from sheetbend.minimum.optimizers import Progress, minimize
 from sheetbend.minimum.problem import FitProblem
+from sheetbend.minimum.search import Search
 from sheetbend.minimum.time_step import halved
 from sheetbend.statistics.identifiability import identify
 from typer.testing import CliRunner
@@ -437,6 +438,23 @@ def test_a_correction_that_does_not_converge_is_no_answer():
     assert not np.any(problem.core.correction(0))  # where it began
     with pytest.raises(sb.SheetbendError, match="the fit cannot start: rope: what is estimated"):
         minimize(problem, u)
+
+
+def test_corrections_that_are_not_found_at_once_come_from_beginnings(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on a flag without drag over 2 s. Here the first evaluation of the whole motion is made to fail."""
+    problem, evaluate, lost = problem_of(shaken(3)), FitProblem.evaluate, list[int]()
+
+    def fails_once(self: FitProblem, u: Array, jacobian: bool = True) -> tuple[bool, Array, Array]:
+        if self is problem and not lost:
+            lost.append(1)
+            return False, np.zeros(0), np.zeros((0, 3))
+        return evaluate(self, u, jacobian)
+
+    monkeypatch.setattr(FitProblem, "evaluate", fails_once)
+    (end,) = Search(windows=()).run(problem).ends
+    assert lost and end.converged and end.windows == approx([1 / 12, 1 / 6, 1 / 3, 1 / 2])
+    _, r, J = problem.evaluate_exactly(end.u)
+    assert np.linalg.lstsq(J, r, rcond=None)[0] == approx(np.zeros(3), abs=1e-4)
 
 
 CONFIG = """

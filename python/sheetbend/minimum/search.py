@@ -28,7 +28,7 @@ AUTO = "auto"
 NEAR_TOLERANCE = 1e-3  # of the cost: what is left is for the optimizer
 MUCH, DONE = 0.25, 1e-3  # of the cost: what a first step promises where the start is near, and at the minimum
 KEPT = 0.9  # of what such a step promises, that it takes off
-BEGINNINGS = (0.125, 0.25, 0.5)  # of the longest motion, for corrections that are not found in all of it
+BEGINNINGS = (0.125, 0.25, 0.5, 0.75)  # of the longest motion, for corrections that are not found in all of it
 NOISE = 2.0  # sigmas: a start whose residuals are no larger is near, too
 
 
