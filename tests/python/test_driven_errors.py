@@ -149,8 +149,8 @@ def test_noise_that_no_interval_feels_costs_eight_draws() -> None:
 def test_what_the_parameters_span_is_found_once_for_all_experiments(monkeypatch: pytest.MonkeyPatch) -> None:
     """Once for each: of 56 windows of a rope that took as long as ten of their derivatives."""
     made: list[int] = []
-    found = module._basis
-    monkeypatch.setattr(module, "_basis", lambda J: made.append(len(J)) or found(J))
+    found = module.spanned
+    monkeypatch.setattr(module, "spanned", lambda J: made.append(len(J)) or found(J))
     experiments = [replace(swung(CASE, 1), name=f"{k}") for k in range(3)]
     problem = FitProblem(experiments, as_parameters(START, experiments))
     u = problem.parameters.to_internal({f"rope_{name}": value for name, value in TRUE.items()})
