@@ -9,37 +9,33 @@ namespace sheetbend {
 template <class K, class T>
 void pull_back_run(const sheetbend_blocks::Block& b, const sheetbend_blocks::Run& r) {
   using W = Wide<T>;
-  for (int n = 0; n < elements<T>(r); ++n) {
-    const int* rows = indices_of<T>(r.first_row, 1, n);
-    const int* nodes = indices_of<T>(r.nodes, K::arity, n);
-    const auto e = load_element<K, T>(b.x, r, nodes, n);
-    W z[K::dofs], u[K::dofs], unused, x_bar[K::dofs]{};
-    for (int k = 0; k < K::arity; ++k) {
-      load_particle(numbers_of<T>(b.z), nodes + k * Pack::lanes, z + 3 * k, unused);
-      load_particle(numbers_of<T>(b.u), nodes + k * Pack::lanes, u + 3 * k, unused);
-    }
+  for (int n = 0; n < Place<T>::count(r); ++n) {
+    const Place<T> at(n);
+    const int *rows = at.indices(r.first_row, 1), *nodes = at.indices(r.nodes, K::arity);
+    const auto e = at.template load_element<K>(b.x, r, nodes);
+    W z[K::dofs], u[K::dofs], x_bar[K::dofs]{};
+    at.template load_stencil<K::arity>(b.z, nodes, z);
+    at.template load_stencil<K::arity>(b.u, nodes, u);
     W lambda[K::rows], C_r[K::rows], dl[K::rows], y[K::rows];
     for (int j = 0; j < K::rows; ++j) {
-      lambda[j] = gather(numbers_of<T>(b.lambda), rows, j);
-      dl[j] = gather(numbers_of<T>(b.dl), rows, j);
-      y[j] = gather(numbers_of<T>(b.y), rows, j);
-      if (r.damped) C_r[j] = gather(numbers_of<T>(b.C_r), rows, j);
+      lambda[j] = at.gather(b.lambda, rows, j);
+      dl[j] = at.gather(b.dl, rows, j);
+      y[j] = at.gather(b.y, rows, j);
+      if (r.damped) C_r[j] = at.gather(b.C_r, rows, j);
     }
     ElementCotangent<K, W> own;
     pull_back(e, Kept<K, W>(e.x), lambda, r.damped ? C_r : nullptr, dl, y, z, u, x_bar, own);
 
-    add_to_particles<K::arity>(numbers_of<T>(b.x_bar), nodes, r.count - n * Pack::lanes, x_bar);
-    const auto add_row = [&](double* to, int j, const W& by) {
-      scatter(numbers_of<T>(to), rows, j, gather(numbers_of<T>(to), rows, j) + by);
-    };
+    at.template add_to_stencil<K::arity>(b.x_bar, nodes, r, x_bar);
+    const auto add_row = [&](double* to, int j, const W& by) { at.scatter(to, rows, j, at.gather(to, rows, j) + by); };
     for (int j = 0; j < K::rows; ++j) {
       add_row(b.lambda_bar, j, own.lambda[j]);
       if (r.damped) add_row(b.C_r_bar, j, own.C_r[j]);
     }
-    W* values_bar = numbers_of<W>(r.values_bar) + static_cast<long>(n) * (2 + parameter_count<K>);
-    values_bar[0] += own.a;
-    if (r.damped) values_bar[1] += own.g;
-    for (int k = 0; k < parameter_count<K>; ++k) values_bar[2 + k] += own.p[k];
+    const auto value_bar = [&](int i) -> W& { return at.value(r.values_bar, 2 + parameter_count<K>, i); };
+    value_bar(0) += own.a;
+    if (r.damped) value_bar(1) += own.g;
+    for (int k = 0; k < parameter_count<K>; ++k) value_bar(2 + k) += own.p[k];
   }
 }
 
@@ -47,14 +43,18 @@ void pull_back_run(const sheetbend_blocks::Block& b, const sheetbend_blocks::Run
 template <class K, class T>
 void values_of_run_vjp(const sheetbend_blocks::Values& b, const sheetbend_blocks::Run& r) {
   using W = Wide<T>;
-  for (int n = 0; n < elements<T>(r); ++n) {
-    const int *nodes = indices_of<T>(r.nodes, K::arity, n), *rows = indices_of<T>(r.first_row, 1, n);
-    W x[K::dofs], unused, scaled[K::rows], by[K::dofs]{};
-    for (int k = 0; k < K::arity; ++k) load_particle(numbers_of<T>(b.x), nodes + k * Pack::lanes, x + 3 * k, unused);
-    for (int j = 0; j < K::rows; ++j) scaled[j] = W(b.scale) * gather(numbers_of<T>(b.C_bar), rows, j);
-    W* values_bar = numbers_of<W>(r.values_bar) + static_cast<long>(n) * (2 + parameter_count<K>);
-    values_vjp<K>(x, parameters_of<K, T>(r, n), scaled, by, values_bar + 2);
-    add_to_particles<K::arity>(numbers_of<T>(b.x_bar), nodes, r.count - n * Pack::lanes, by);
+  constexpr int parameters = parameter_count<K>;
+  for (int n = 0; n < Place<T>::count(r); ++n) {
+    const Place<T> at(n);
+    const int *nodes = at.indices(r.nodes, K::arity), *rows = at.indices(r.first_row, 1);
+    W x[K::dofs], p[parameters + 1], scaled[K::rows], x_bar[K::dofs]{}, p_bar[parameters + 1];
+    at.template load_stencil<K::arity>(b.x, nodes, x);
+    at.template load_parameters<K>(r, p);
+    for (int j = 0; j < K::rows; ++j) scaled[j] = W(b.scale) * at.gather(b.C_bar, rows, j);
+    for (int k = 0; k < parameters; ++k) p_bar[k] = at.value(r.values_bar, 2 + parameters, 2 + k);
+    values_vjp<K>(x, p, scaled, x_bar, p_bar);
+    for (int k = 0; k < parameters; ++k) at.value(r.values_bar, 2 + parameters, 2 + k) = p_bar[k];
+    at.template add_to_stencil<K::arity>(b.x_bar, nodes, r, x_bar);
   }
 }
 

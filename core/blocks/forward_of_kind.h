@@ -7,46 +7,46 @@ namespace sheetbend {
 
 template <class K, class T>
 void evaluate_run(const sheetbend_blocks::Block& b, const sheetbend_blocks::Run& r) {
-  for (int n = 0; n < elements<T>(r); ++n) {
-    const int* rows = indices_of<T>(r.first_row, 1, n);
-    const int* gradients = indices_of<T>(r.gradients, K::arity, n);
-    const auto e = load_element<K, T>(b.x, r, indices_of<T>(r.nodes, K::arity, n), n);
+  for (int n = 0; n < Place<T>::count(r); ++n) {
+    const Place<T> at(n);
+    const int* rows = at.indices(r.first_row, 1);
+    const int* gradients = at.indices(r.gradients, K::arity);
+    const auto e = at.template load_element<K>(b.x, r, at.indices(r.nodes, K::arity));
     const Evaluation<K, Wide<T>> value(e.x, e.p);
     Wide<T> lambda[K::rows], C_r[K::rows];
     for (int j = 0; j < K::rows; ++j) {
-      lambda[j] = gather(numbers_of<T>(b.lambda), rows, j);
-      if (r.damped) C_r[j] = gather(numbers_of<T>(b.C_r), rows, j);
+      lambda[j] = at.gather(b.lambda, rows, j);
+      if (r.damped) C_r[j] = at.gather(b.C_r, rows, j);
     }
     for (int j = 0; j < K::rows; ++j) {
-      scatter(numbers_of<T>(b.dl), rows, j,
-              -(e.residual(value.C, lambda, r.damped ? C_r : nullptr, j) * e.rates.scale));
+      at.scatter(b.dl, rows, j, -(e.residual(value.C, lambda, r.damped ? C_r : nullptr, j) * e.rates.scale));
       for (int k = 0; k < K::arity; ++k)
-        store_gradient(numbers_of<T>(b.gradients), gradients + k * Pack::lanes, j, value.J + j * K::dofs + 3 * k);
+        at.store_row(b.gradients, gradients + k * Pack::lanes, sheetbend_blocks::row * j,
+                     value.J + j * K::dofs + 3 * k);
     }
   }
 }
 
 template <class K, class T>
 void values_of_run(const sheetbend_blocks::Values& b, const sheetbend_blocks::Run& r) {
-  using W = Wide<T>;
-  for (int n = 0; n < elements<T>(r); ++n) {
-    const int* nodes = indices_of<T>(r.nodes, K::arity, n);
-    W x[K::dofs], unused;
-    for (int k = 0; k < K::arity; ++k) load_particle(numbers_of<T>(b.x), nodes + k * Pack::lanes, x + 3 * k, unused);
-    const Evaluation<K, W> value(x, parameters_of<K, T>(r, n));
-    for (int j = 0; j < K::rows; ++j) scatter(numbers_of<T>(b.C), indices_of<T>(r.first_row, 1, n), j, value.C[j]);
+  for (int n = 0; n < Place<T>::count(r); ++n) {
+    const Place<T> at(n);
+    Wide<T> x[K::dofs], p[parameter_count<K> + 1];
+    at.template load_stencil<K::arity>(b.x, at.indices(r.nodes, K::arity), x);
+    at.template load_parameters<K>(r, p);
+    const Evaluation<K, Wide<T>> value(x, p);
+    for (int j = 0; j < K::rows; ++j) at.scatter(b.C, at.indices(r.first_row, 1), j, value.C[j]);
   }
 }
 
 template <class K, class T>
 void refer_run(const sheetbend_blocks::References& b, const sheetbend_blocks::Run& r) {
-  for (int n = 0; n < elements<T>(r); ++n) {
-    const int* rows = indices_of<T>(r.first_row, 1, n);
+  for (int n = 0; n < Place<T>::count(r); ++n) {
+    const Place<T> at(n);
+    const int* rows = at.indices(r.first_row, 1);
     for (int j = 0; j < K::rows; ++j) {
-      const Wide<T> now = gather(numbers_of<T>(b.C), rows, j);
-      const Wide<T> before = gather(numbers_of<T>(b.C_before), rows, j);
-      scatter(numbers_of<T>(b.C_r), rows, j,
-              b.before == 0.0 ? now : now - Wide<T>(b.before) * difference<K>(now, before));
+      const Wide<T> now = at.gather(b.C, rows, j), before = at.gather(b.C_before, rows, j);
+      at.scatter(b.C_r, rows, j, b.before == 0.0 ? now : now - Wide<T>(b.before) * difference<K>(now, before));
     }
   }
 }

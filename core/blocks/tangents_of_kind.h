@@ -31,8 +31,9 @@ void load_tangents(const double* rows, const double* directions, const int* node
 template <class K>
 void tangents_of_member(const sheetbend_blocks::Block& b, const sheetbend_blocks::Tangents& t, int r, int n, int lane) {
   const sheetbend_blocks::Run& run = b.runs[r];
-  const int* nodes = indices_of<Tangent>(run.nodes, K::arity, n);
-  const int row = *indices_of<Tangent>(run.first_row, 1, n);
+  const Place<Tangent> at(n);
+  const int* nodes = at.indices(run.nodes, K::arity);
+  const int row = *at.indices(run.first_row, 1);
   const MemberValues<K> values{run, t.values[r], n, lane};
   Element<K, Tangent> e;
   load_tangents<K>(b.x, t.x, nodes, lane, e.x);
@@ -76,32 +77,33 @@ void tangents_of_run(const sheetbend_blocks::Block& b, const sheetbend_blocks::T
 template <class K>
 inline constexpr bool has_plain_parameters = parameter_count<K> == K::factors + K::offsets;
 
-// C' = J x' and what the parameters add. The gradients of eight members are found at a time, with a factor as if it were one.
+// C' = J x' and what the parameters add. The gradients of a register's members are found at a time, with a factor as if it were one.
 template <class K>
 void values_tangents_by_gradient(const sheetbend_blocks::Values& b, const sheetbend_blocks::ValueTangents& t, int r) {
   const sheetbend_blocks::Run& run = b.runs[r];
-  for (int first = 0; first < run.count; first += Pack::lanes) {
-    const int* nodes = indices_of<Tangent>(run.nodes, K::arity, first);
-    Pack x[K::dofs], unused, p[parameter_count<K> + 1];
-    for (int k = 0; k < K::arity; ++k) load_particle(b.x, nodes + k * Pack::lanes, x + 3 * k, unused);
-    for (int k = 0; k < parameter_count<K>; ++k) p[k] = Pack(k < K::factors ? 1.0 : 0.0);
-    const Evaluation<K, Pack> value(x, p);
+  for (int n = 0; n < Place<double>::count(run); ++n) {
+    const Place<double> at(n);
+    const int* nodes = at.indices(run.nodes, K::arity);
+    Register x[K::dofs], p[parameter_count<K> + 1];
+    at.load_stencil<K::arity>(b.x, nodes, x);
+    for (int k = 0; k < parameter_count<K>; ++k) p[k] = Register(k < K::factors ? 1.0 : 0.0);
+    const Evaluation<K, Register> value(x, p);
     const auto *C = reinterpret_cast<const double*>(value.C), *J = reinterpret_cast<const double*>(value.J);
-    for (int member = 0; member < std::min(Pack::lanes, run.count - first); ++member)
+    for (int member = 0; member < at.members(run); ++member)
       for (int lane = 0; lane < Pack::lanes; lane += register_lanes) {
-        const MemberValues<K> values{run, t.values[r], first + member, lane};
+        const MemberValues<K> values{run, t.values[r], n * register_lanes + member, lane};
         Tangent own[parameter_count<K> + 1];
         values.parameters(own);
         unrolled<K::rows>([&](auto j) {
           Register sum(0.0);
           unrolled<K::dofs>([&](auto d) {
-            sum += Register(J[(j * K::dofs + d) * Pack::lanes + member]) *
+            sum += Register(J[(j * K::dofs + d) * register_lanes + member]) *
                    directions_at(t.x, nodes[d / 3 * Pack::lanes + member] + long(d % 3), lane);
           });
           if constexpr (K::factors > 0 && j == K::rows - 1)
-            sum = own[0].v * sum + Register(C[j * Pack::lanes + member]) * own[0].d[0];
+            sum = own[0].v * sum + Register(C[j * register_lanes + member]) * own[0].d[0];
           if constexpr (j < K::offsets) sum -= own[K::factors + j].d[0];
-          directions_at(t.C, *indices_of<Tangent>(run.first_row, 1, first + member) + j, lane) = sum;
+          directions_at(t.C, at.indices(run.first_row, 1)[member] + j, lane) = sum;
         });
       }
   }
@@ -112,11 +114,12 @@ void values_tangents_on_duals(const sheetbend_blocks::Values& b, const sheetbend
   const sheetbend_blocks::Run& run = b.runs[r];
   for (int n = 0; n < run.count; ++n)
     for (int lane = 0; lane < Pack::lanes; lane += register_lanes) {
+      const Place<Tangent> at(n);
       Tangent x[K::dofs], p[parameter_count<K> > 0 ? parameter_count<K> : 1];
-      load_tangents<K>(b.x, t.x, indices_of<Tangent>(run.nodes, K::arity, n), lane, x);
+      load_tangents<K>(b.x, t.x, at.indices(run.nodes, K::arity), lane, x);
       MemberValues<K>{run, t.values[r], n, lane}.parameters(p);
       const Evaluation<K, Tangent> value(x, p);
-      const int row = *indices_of<Tangent>(run.first_row, 1, n);
+      const int row = *at.indices(run.first_row, 1);
       for (int j = 0; j < K::rows; ++j) directions_at(t.C, row + j, lane) = value.C[j].d[0];
     }
 }

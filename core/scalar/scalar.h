@@ -9,13 +9,15 @@
 
 namespace sheetbend {
 
-// Doubles in a register of the instruction set that is compiled for.
+// Doubles in a register of the instruction set that is compiled for, and how many registers it has.
 #if defined(__AVX512F__)
-inline constexpr int register_lanes = 8;
+inline constexpr int register_lanes = 8, registers = 32;
 #elif defined(__AVX__)
-inline constexpr int register_lanes = 4;
+inline constexpr int register_lanes = 4, registers = 16;
+#elif defined(__x86_64__)
+inline constexpr int register_lanes = 2, registers = 16;
 #else
-inline constexpr int register_lanes = 2;
+inline constexpr int register_lanes = 2, registers = 32;
 #endif
 
 inline double sqrt(double a) { return __builtin_sqrt(a); }
