@@ -1,5 +1,7 @@
 #include "adjoint/settled.h"
 
+#include <algorithm>
+
 #include "core/rollout/rollout.h"
 
 namespace sheetbend {
