@@ -20,7 +20,7 @@ struct Estimated {
   template <class V>
   std::vector<double> at(const V& b) const {
     std::vector<double> numbers = given;
-    for (int i = 0; i < unknowns(); ++i) numbers[i] = sigma[i] * b[i];
+    for (int i = 0, found = unknowns(); i < found; ++i) numbers[i] = sigma[i] * b[i];
     return numbers;
   }
 

@@ -13,7 +13,7 @@ std::size_t size_in_bytes(const std::vector<V>& v) {
 
 // Colors or blocks: what was found once about the scene.
 inline std::size_t plan_bytes(const Plan& plan) {
-  std::size_t bytes = size_in_bytes(plan.packs.ghosts);
+  std::size_t bytes = size_in_bytes(plan.packs.ghosts) + size_in_bytes(plan.contacts);
   for (const Color& color : plan.colors) bytes += size_in_bytes(color.items);
   for (const PackedColor& color : plan.packs.colors) bytes += size_in_bytes(color.items) + size_in_bytes(color.nodes);
   for (const DirectBlock& block : plan.blocks) {

@@ -1,6 +1,7 @@
 #include "adjoint/settled.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/rollout/rollout.h"
 
@@ -14,6 +15,13 @@ std::vector<T> at_rest(const Scene& scene, const T* inputs) {
   return still;
 }
 
+// Pinned nodes stay as they are given: forces that contacts carry and sets that slide stand there, which so short a substep would make by its own measure.
+template <class F>
+void for_each_pinned(const Scene& scene, F&& f) {
+  for (int n = 0; n < scene.nodes(); ++n)
+    for (int d = 0; scene.role[n] == Role::pinned && d < 3; ++d) f(scene.first_dof[n] + d);
+}
+
 double before(const Plan& settling, double t0) { return t0 - settling.options.h; }
 
 }  // namespace
@@ -23,7 +31,9 @@ std::vector<T> settled_coordinates(const Scene& scene, const Plan& settling, con
   const std::vector<T> still = at_rest(scene, inputs);
   Rollout<T> one(scene, settling, still.data(), before(settling, t0));
   one.advance();
-  return {one.x(), one.x() + scene.dofs()};
+  std::vector<T> x(one.x(), one.x() + scene.dofs());
+  for_each_pinned(scene, [&](int i) { x[i] = inputs[scene.layout.of(Quantity::position) + i]; });
+  return x;
 }
 
 template std::vector<double> settled_coordinates(const Scene&, const Plan&, const double*, double);
@@ -36,11 +46,15 @@ Settled::Settled(const Scene& scene, const Plan& settling, const double* inputs,
       t0_(before(settling, t0)),
       still_(at_rest(scene, inputs)),
       x_(scene.dofs()),
-      tape_(record_rollout(scene, settling, still_.data(), t0_, {1}, x_.data(), every_state, nullptr)) {}
+      tape_(record_rollout(scene, settling, still_.data(), t0_, {1}, x_.data(), every_state, nullptr)) {
+  for_each_pinned(scene, [&](int i) { x_[i] = still_[scene.layout.of(Quantity::position) + i]; });
+}
 
 void Settled::pull_back(const double* x_bar, double* inputs_bar) {
-  std::vector<double> own(scene_.layout.total());
-  reverse_rollout(scene_, settling_, still_.data(), t0_, tape_, {1}, x_bar, own.data(), nullptr);
+  std::vector<double> own(scene_.layout.total()), moved_bar(x_bar, x_bar + scene_.dofs());
+  for_each_pinned(
+      scene_, [&](int i) { inputs_bar[scene_.layout.of(Quantity::position) + i] += std::exchange(moved_bar[i], 0.0); });
+  reverse_rollout(scene_, settling_, still_.data(), t0_, tape_, {1}, moved_bar.data(), own.data(), nullptr);
   const std::size_t v = scene_.layout.of(Quantity::velocity);
   for (std::size_t i = 0; i < own.size(); ++i)
     if (i < v || i >= v + scene_.dofs()) inputs_bar[i] += own[i];

@@ -1,6 +1,6 @@
 // Places at the start that come from numbers, such as those of an estimated start, break rigid links by a little, and the first substep would throw
 // particles back with a velocity of the error over its length. Such a motion starts where a very short substep from rest leaves them: there is time for
-// rigid links to hold, and for nothing else.
+// rigid links to hold, and for nothing else: what contacts carry, and what has slid, stays as it is given.
 #pragma once
 
 #include <vector>

@@ -110,10 +110,10 @@ function(sheetbend_add_kernels variant part)
     target_compile_options(${library} PRIVATE -march=${name})
   endif()
   if(NOT SHEETBEND_SANITIZE)
-    target_compile_options(${library} PRIVATE ${kernels_OPTIONS})
+    # They throw nothing and call nothing that throws, so nobody unwinds them: the tables for it are an eighth of the portable ones. Sanitizers
+    # print stacks by these tables.
+    target_compile_options(${library} PRIVATE ${kernels_OPTIONS} -fno-exceptions -fno-asynchronous-unwind-tables)
   endif()
-  # They throw nothing and call nothing that throws, so nobody unwinds them: the tables for it are an eighth of the portable ones.
-  target_compile_options(${library} PRIVATE -fno-exceptions -fno-asynchronous-unwind-tables)
   target_compile_definitions(${library} PRIVATE sheetbend=sheetbend_${variant} SHEETBEND_VARIANT=${variant}
                                                 SHEETBEND_VARIANT_NAME="${name}")
   if(kernels_COLD_VARIANT)

@@ -160,7 +160,8 @@ void Problem::project(const double* u, double* residual, double* jacobian) const
     Projection& own = *projections_[e];
     const auto at = [&](int r) { return jacobian + static_cast<std::size_t>(r) * parameters(); };
     if (jacobian) own.project(u, residual + first_row_[e], at(first_row_[e]), at(row));
-    for (int i = 0; i < own.unknowns(); ++i) residual[row++] = own.b()[i] / experiments_[e].correction.sigma[i];
+    for (int i = 0, count = own.unknowns(); i < count; ++i)
+      residual[row++] = own.b()[i] / experiments_[e].correction.sigma[i];
   }
 }
 

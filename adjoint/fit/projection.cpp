@@ -23,7 +23,7 @@ double sum_of_squares(const std::vector<double>& a) { return std::inner_product(
 Projection::Projection(const Experiment& e, int parameters, int threads)
     : e_(&e), parameters_(parameters), threads_(threads), given_(e.correction.given) {
   b_.resize(unknowns());
-  for (int i = 0; i < unknowns(); ++i) b_[i] = given_[i] / e.correction.sigma[i];
+  for (int i = 0, count = unknowns(); i < count; ++i) b_[i] = given_[i] / e.correction.sigma[i];
 }
 
 void Projection::linearize(const Corrected& here, Place place, double damping, Interrupt* interrupt) {

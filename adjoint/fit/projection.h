@@ -20,8 +20,8 @@ struct NoCorrection : std::runtime_error {
   NoCorrection()
       : std::runtime_error(
             "what is estimated along the way (a start, the motion of driven markers) did not converge. Fix: start "
-            "nearer, or "
-            "fit a shorter window first") {}
+            "nearer, "
+            "or fit a shorter window first") {}
 };
 
 class Projection {

@@ -1,4 +1,5 @@
-// joint_friction: dry friction (dry_friction.h) in a hinge between bodies. The angle from the set is theta of joint_angle.h less the set, which is its dial  [rad].
+// joint_friction: dry friction (dry_friction.h) in a hinge between bodies. The angle from the set is theta of joint_angle.h less the set, the x of the
+// stencil's last node [rad].
 // Stencil and degenerate cases: as joint_angle.
 #pragma once
 

@@ -95,7 +95,7 @@ inline Balanced balanced(const AnyShape& shape, const Vec3<double>& y, double w,
     const Balanced next = balanced_on_plane(shape, b.z, distance, n, y, w, c);
     const double moved = largest_of(next.z - b.z);
     b = next, last = n;
-    if (moved <= rounding * (largest_of(y) + largest_of(b.z - y))) return b;
+    if (!(moved > rounding * (largest_of(y) + largest_of(b.z - y)))) return b;  // of NaN too, which the rollout finds
   }
   b.found = false;
   return b;

@@ -9,11 +9,11 @@ namespace sheetbend {
 template <class T, int N = 1>
 struct Dual {
   static constexpr int directions = N;
-  // Where the directions of two of them fill nearly all registers, they are in memory whatever is done. Unrolled, an operation on them is a hundred instructions,
+  // Where the directions of two of them fill more than 7/8 of all registers, they are in memory whatever is done. Unrolled, an operation on them is a hundred instructions,
   // which the processor fetches once each: a loop is faster, and a quarter of the code. Over plain numbers it is slower
   // (docs/decisions/what-a-build-compiles.md).
   static constexpr bool rolled = !std::same_as<T, double> &&
-                                 2 * N * sizeof(T) > 7.0 / 8.0 * registers* register_lanes * sizeof(double);
+                                 16 * N * sizeof(T) > 7 * sizeof(double) * registers* register_lanes;
   // Directions first, so that code on pairs of them and copies of the whole move the same 16 bytes: a load across two stores that are still
   // under way waits for both, which took more than half the time of a rope's Jacobian.
   T d[N];

@@ -5,24 +5,15 @@
 // direction of descent. The same holds where rows do not give way, whose multipliers are unknowns beside the coordinates (rigid_rows.h). Frames of rods stay settled (block_frames.h).
 #pragma once
 
-#include <stdexcept>
 #include <type_traits>
 #include <vector>
 
 #include "core/linear/conjugate_gradients.h"
 #include "core/solver/block_frames.h"
 #include "core/solver/newton_matrix.h"
+#include "core/solver/unbalanced.h"
 
 namespace sheetbend {
-
-// The forces of a substep do not balance after as many Newton matrices as it may take; or they do where K is singular, and have no derivative.
-struct Unbalanced : Unconverged {
-  std::string problem, fix;
-  int substep = -1, node;  // node: the particle whose forces balance worst
-  double time = 0.0;
-  Unbalanced(const std::string& problem, const std::string& fix, int matrices, double residual, int node);
-  Unbalanced(const Unbalanced& e, int substep, double time);  // the same, saying when
-};
 
 class ImplicitBlock {
  public:

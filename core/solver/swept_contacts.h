@@ -9,8 +9,8 @@
 
 #include "core/contact/balanced.h"
 #include "core/solver/contact_source.h"
-#include "core/solver/implicit_block.h"
 #include "core/solver/plan.h"
+#include "core/solver/unbalanced.h"
 
 namespace sheetbend {
 
@@ -24,7 +24,8 @@ struct SweptContacts {
   };
   ColliderPoses<S> poses;
   std::vector<ContactNumbers<S>> numbers;  // per contact of the plan; of those that have not come near, radius and size
-  std::vector<char> near;    // likewise: whether any pass found it below the surface, or restitution may lift it
+  std::vector<char>
+      near;  // likewise: whether its numbers are at hand: a pass found it below the surface, or it rebounds
   std::vector<Push> pushes;  // contact after contact, of all passes or the last one
 
   void resize(const Plan& plan, int kept_iterations) {
@@ -65,10 +66,11 @@ struct SweptContacts {
   template <class T>
   bool comes_near(const ContactSource<T>& source, const SweptContact& c, int i, const Vec3<S>& y) {
     if (near[i]) return true;
-    S at[3], n[3], distance;
-    poses.next[c.collider].in_frame(y).store(at);
-    distance_from(c.shape, at, numbers[i].size, distance, n);
-    if (!(value_of(distance - numbers[i].radius) < 0.0)) return false;
+    double at[3], n[3], size[most_sizes], distance;
+    for (int k = 0; k < most_sizes; ++k) size[k] = value_of(numbers[i].size[k]);
+    values_of(poses.next[c.collider].in_frame(y)).store(at);
+    distance_from(c.shape, at, size, distance, n);
+    if (!(distance - value_of(numbers[i].radius) < 0.0)) return false;
     numbers[i] = source.numbers(poses, c.contact, c.item);
     near[i] = true;
     return true;

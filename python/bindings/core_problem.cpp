@@ -89,7 +89,9 @@ Estimated make_correction(const py::dict& d) {
 
 Start start_of(const std::string& name) {
   if (name == "estimated" || name == "settled") return Start::settled;
-  return name == "equilibrium" ? Start::equilibrium : Start::given;
+  if (name == "equilibrium") return Start::equilibrium;
+  if (name == "given") return Start::given;
+  throw std::invalid_argument("start: '" + name + "' is unknown");
 }
 
 Experiment make_experiment(const py::dict& d) {

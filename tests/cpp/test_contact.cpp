@@ -3,6 +3,7 @@
 #include <tuple>
 
 #include "adjoint/contact/touch_vjp.h"
+#include "core/contact/balanced.h"
 #include "tests/cpp/support/compare.h"
 #include "tests/cpp/support/distance_grids.h"
 
@@ -179,6 +180,16 @@ TEST(Law, HasTheMatrixOfComplexSteps) {
     } else if (s.shape == shape_of("sphere")) {
       EXPECT_GT(apart, 1e-4);
     }
+  }
+}
+
+// What contacts between sweeps solve, z = y + w F(z).
+TEST(Balance, IsWhereAPointAndItsForceAgree) {
+  for (const Sample& s : samples()) {
+    const double w = rigidity / s.numbers.kappa;
+    const Balanced b = balanced(any(s.shape), s.z, w, s.numbers);
+    ASSERT_TRUE(b.found && b.pushes) << s.shape;
+    EXPECT_LT(largest_of(unbalance(any(s.shape), b.z, s.z, w, s.numbers)), 1e-11) << s.shape;
   }
 }
 

@@ -113,6 +113,12 @@ TEST(FootprintOfContacts, IsWhatIsAllocated) {
   const Plan plan = make_plan(sample.scene, contact_options(1e-3, Integrator::bdf2));
   expect_footprint<double>(sample.scene, plan, sample.inputs);
   expect_footprint<Dual<double, 1>>(sample.scene, plan, {sample.inputs.begin(), sample.inputs.end()});
+  SolverOptions sweeps = contact_options(1e-3, Integrator::bdf2);
+  sweeps.partition = Partition::gauss_seidel, sweeps.iterations = 5;
+  const Plan swept = make_plan(sample.scene, sweeps);
+  expect_footprint<double>(sample.scene, swept, sample.inputs);
+  expect_footprint<Pack>(sample.scene, swept, {sample.inputs.begin(), sample.inputs.end()});
+  expect_footprint<Dual<double, 1>>(sample.scene, swept, {sample.inputs.begin(), sample.inputs.end()});
 }
 
 TEST_P(Footprint, KeepsToTheBudget) {

@@ -199,8 +199,8 @@ TEST(PotentialKernels, GiveTheSameBitsOnEveryInstructionSet) {
     for (const double* sums :
          std::initializer_list<const double*>{arrays.force, arrays.magnitude, arrays.stiffness, Ez.data()})
       found.insert(found.end(), sums, sums + row * block.particles.size());
-    for (std::size_t r = 0; r < elements.size();
-         ++r) {  // of members; what stands in lanes behind the last one is nobody's
+    // Of members alone: lanes behind the last one are not read.
+    for (std::size_t r = 0; r < elements.size(); ++r) {
       const auto& run = block.runs[r];
       const int numbers = triangle(3 * c.sample.scene.groups[run.group].arity);
       for (int i = 0; i < run.count; ++i)

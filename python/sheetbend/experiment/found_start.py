@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..motion.equilibrium import equilibrium
 from ..motion.simulate import simulate
 from .estimated_start import fields_at
 from .experiment import Experiment
@@ -33,10 +34,20 @@ def start_moved(e: Experiment, numbers: Array) -> tuple[float, float]:
     return float(np.sqrt(np.mean(x[moving] ** 2))), float(np.sqrt(np.mean(v[moving] ** 2)))
 
 
+def start_nodes(e: Experiment, values: Mapping[str, float]) -> Array | None:
+    """(nodes, 3) m, where a motion starts at values of its scene's quantities, if that is not where the scene does."""
+    if e.start == "settled":
+        return settled(e, values)
+    return equilibrium(e.scene, values=values).nodes if e.start == "equilibrium" else None
+
+
 def settled(e: Experiment, values: Mapping[str, float]) -> Array:
     """(nodes, 3) m, where the scene starts once rigid links hold, at values of its quantities."""
     solver = replace(e.solver, h=SHORT * e.solver.h, iterations=max(ITERATIONS, e.solver.sweeps), extrapolate=1)
     compiled = e.scene.compiled
     inputs = compiled.inputs(compiled.values(values))
     x, v = fields_at(compiled, inputs)
-    return np.asarray(simulate(e.scene, [solver.h], solver, values, x - solver.h * v).nodes[-1])
+    moved = np.array(simulate(e.scene, [solver.h], solver, values, x - solver.h * v).nodes[-1])
+    pinned = sorted(e.scene.pinned)
+    moved[pinned] = x[pinned]
+    return moved
