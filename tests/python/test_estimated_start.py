@@ -142,7 +142,7 @@ def test_a_start_needs_frames_markers_and_plain_runs() -> None:
         problem_of(replace(e, solver=replace(SOLVER, extrapolate=2)))
     with pytest.raises(sb.InputError, match="start: is not estimated of many recordings"):
         sb.fit_many([replace(e, name=str(k)) for k in range(20)], WANTED)
-    with pytest.raises(sb.InputError, match="with unknowns by `start`"):
+    with pytest.raises(sb.InputError, match="from a motion with `start`"):
         sb.fit(e, parameters=WANTED, bootstrap=50)
 
 

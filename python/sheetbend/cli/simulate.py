@@ -182,6 +182,9 @@ def _files(task: Task, folder: Path, mesh: MeshFormat | None) -> list[Path]:
 
 
 def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None, movie: Path | None) -> dict[str, Any]:
+    if task.experiment is not None and task.experiment.start == "estimated":
+        told = f"{task.name} begins at the given start: a configuration does not hold the estimated one"
+        warnings.warn(told, stacklevel=2)
     motion = motion_of(task)
     depths = {contact: counts.deepest for contact, counts in motion.contacts.items() if counts.deepest is not None}
     for words in too_deep(task.scene, None, depths):

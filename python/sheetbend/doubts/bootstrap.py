@@ -50,7 +50,7 @@ def check_bootstrap(draws: int, problem: FitProblem) -> None:
         given = {"driven_sigma": e.driven_sigma, "shooting": e.shooting, "start": e.start == "estimated" or None}
         for key in (key for key, value in given.items() if value is not None):
             fix = f"leave out `bootstrap`, or `{key}` of {e.name!r}"
-            raise InputError("bootstrap", f"cannot draw from motions with unknowns by `{key}`", draws, fix)
+            raise InputError("bootstrap", f"cannot draw from a motion with `{key}`, whose own unknowns tie its residuals together", draws, fix)
 
 
 def bootstrap(problem: FitProblem, u: Array, draws: int, autocorrelation_time: float) -> tuple[Bootstrap | None, str]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..arrays.timeseries import Array
 from ..experiment.experiment import Experiment
+from ..experiment.found_start import start_nodes
 from ..minimum.problem import FitProblem
 from ..motion.simulate import simulate
 from ..recording.recording import Recording
@@ -42,6 +43,8 @@ def drafts(problem: FitProblem, u: Array, i: int, inputs: Array) -> tuple[FitPro
     if not len(particles):
         return problem, []
     forces = copy.deepcopy(e.scene.forces)
+    if drag[1].any() and forces.particles and len(forces.times) == 1:
+        return problem, []  # forces that do not change leave no room for those of a draft that do
     times = forces.times if forces.particles else _knots(e, recording, values, drag[1])
     new = particles[~np.isin(particles, forces.particles)]
     forces.add(new, np.zeros((len(times), len(new), 3)), times)
@@ -51,7 +54,7 @@ def drafts(problem: FitProblem, u: Array, i: int, inputs: Array) -> tuple[FitPro
     slot = {p: k for k, p in enumerate(forces.particles)}
     slots = np.array([slot[p] for p in particles.tolist()])
     where = np.arange(len(times))[:, None] * len(slot) + slots
-    per_speed = _per_speed(e, values, times, drag[:, particles], particles)
+    per_speed = _per_speed(problem.experiment_at(i, u), values, times, drag[:, particles], particles)
     entries = (3 * where[..., None] + np.arange(3)).ravel()
     return made, [("force", entries, per_speed[..., axis].ravel()) for axis in range(3)]
 
@@ -81,7 +84,7 @@ def _per_speed(
     if not quadratic.any():
         return found
     at = np.clip(np.rint(times / e.solver.h), 0, None) * e.solver.h
-    v = simulate(e.scene, at, e.solver, values).velocities[:, particles]
+    v = simulate(e.scene, at, e.solver, values, start_nodes(e, values)).velocities[:, particles]
     speed = np.linalg.norm(v, axis=-1)[..., None, None]
     along = v[..., :, None] * v[..., None, :] / np.maximum(speed, np.finfo(float).tiny)
     return np.asarray(found + quadratic * (speed * np.eye(3) + along))

@@ -27,15 +27,17 @@ NOTHING_FELT = 1e-9  # of a half-width: a told number that moves less has no par
 
 @dataclass
 class _Errors:
-    """The independent errors of one told number: J'g and g'g of each by label, over all experiments."""
+    """The independent errors of one told number: J'g and g'g of each by label, over all experiments, and its step."""
 
     told: Told
     columns: dict[str, Array] = field(default_factory=dict)
     squares: dict[str, float] = field(default_factory=dict)
+    steps: dict[str, tuple[float, str]] = field(default_factory=dict)
 
-    def add(self, label: str, column: Array, square: float) -> None:
-        self.columns[label] = self.columns.get(label, 0.0) + column
-        self.squares[label] = self.squares.get(label, 0.0) + square
+    def add(self, one: Told, column: Array) -> None:
+        self.columns[one.label] = self.columns.get(one.label, 0.0) + column
+        self.squares[one.label] = self.squares.get(one.label, 0.0) + float(one.column @ one.column)
+        self.steps[one.label] = max(self.steps.get(one.label, one.step), one.step)
 
 
 def check_given(given: Mapping[str, float], problem: FitProblem) -> None:
@@ -75,9 +77,7 @@ def premises(problem: FitProblem, u: Array, given: Mapping[str, float], told: Se
     for one in told:
         if one.name and given.get(one.name) != 0.0:
             mine = J[rows[one.experiment] : rows[one.experiment + 1]][one.rows]
-            errors.setdefault(one.name, _Errors(one)).add(
-                one.label, mine.T @ one.column, float(one.column @ one.column)
-            )
+            errors.setdefault(one.name, _Errors(one)).add(one, mine.T @ one.column)
     solve, tested = _Response(problem, u, J), not problem.estimates_corrections
     return tuple(
         premise
@@ -130,13 +130,14 @@ def _premises(
     name: str, errors: _Errors, solve: _Response, given: Mapping[str, float], tested: bool
 ) -> Iterator[Premise]:
     told = errors.told
-    moved = {label: told.step[0] * solve(column) for label, column in errors.columns.items()}
+    steps = {name: told.step} | errors.steps
+    moved = {label: steps[label][0] * solve(column) for label, column in errors.columns.items()}
     if name == "markers" and moved:  # independent of each other
         moved = {name: np.sqrt(np.square(list(moved.values())).sum(axis=0))}
         tested = False  # of many errors at once no single one is named
     sd = given.get(name)
     for label, by in moved.items():
-        off_by = told.step[0]
+        off_by, words = steps[label]
         if told.relative and told.value is not None:
             off_by *= abs(told.value)
         yield Premise(
@@ -144,8 +145,8 @@ def _premises(
             value=told.value,
             unit=told.unit,
             off_by=off_by,
-            words=told.step[1],
+            words=words,
             moved={n: float(m) for n, m, k in zip(solve.names, by, solve.known, strict=True) if k},
-            leaves=told.step[0] * solve.leaves(errors.columns[label], errors.squares[label]) if tested else 0.0,
+            leaves=steps[label][0] * solve.leaves(errors.columns[label], errors.squares[label]) if tested else 0.0,
             sd=None if sd is None else sd * abs(told.value) if told.relative and told.value is not None else sd,
         )

@@ -1,8 +1,7 @@
-"""What errors of force sensors change of residuals: how much they read per newton, their zeros, how
-they stand, and their clocks.
+"""What errors of force sensors change of residuals: how much they read per newton, their zeros, their axes and clocks.
 
 Readings enter the residuals as they are, so each of these changes them by what is known without derivatives. It is
-told from the simulated readings: measured ones hold noise, which a sensor that read nothing would explain. Which row
+told from the simulated readings: measured ones hold noise, and a sensor that read nothing would explain it. Which row
 belongs to which reading is asked once, with readings that are moved by a number of their own.
 """
 
@@ -15,11 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays.timeseries import Array
+from ..errors import SheetbendError
 from ..experiment.force_sensor import ForceSensor
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
 
 Says = Callable[[float], str]
+SHARED = ("force_size", "force_direction", "force_delay")  # of the forces and the torques of one sensor
 
 
 @dataclass(frozen=True)
@@ -52,8 +53,12 @@ class _Readings:
 
 
 def sensor_errors(problem: FitProblem, u: Array, i: int) -> list[SensorError]:
-    """Of the sensors of the i-th experiment at u (free,); none where it has none, or has corrections. One simulation
-    without derivatives."""
+    """Of the sensors of the i-th experiment at u (free,); none where it has none, or where motions have corrections.
+    Takes two evaluations of the residuals without derivatives.
+
+    Raises:
+        SheetbendError: a motion has no answer at u.
+    """
     e = problem.experiments[i]
     if not e.forces or problem.estimates_corrections:
         return []
@@ -66,7 +71,7 @@ def sensor_errors(problem: FitProblem, u: Array, i: int) -> list[SensorError]:
     _, r, _ = problem.evaluate(u, jacobian=False)
     ok, more, _ = there.evaluate(u, jacobian=False)
     if not ok:
-        return []
+        raise SheetbendError(there.failure)
     at = np.rint(r[own] - more[own]).astype(np.int64) - 1  # place among all readings, -1 of what is none
     compared = at >= 0
     simulated = np.concatenate([each.values.ravel() for each in measured])
@@ -75,14 +80,16 @@ def sensor_errors(problem: FitProblem, u: Array, i: int) -> list[SensorError]:
     measured = [replace(each, values=values) for each, values in zip(measured, parts, strict=True)]
     found = []
     for k, (end, each) in enumerate(zip(ends, measured, strict=True)):
-        first = end - each.values.size
+        torques = next((other for other in measured[k + 1 : k + 2] if other.sensor is each.sensor), None)
         for name, label, step, by, says in _errors(each):
             every = np.zeros(ends[-1] + 1)
-            every[first:end] = np.nan_to_num(by.ravel())
-            if name == "force_size" and k + 1 < len(measured) and measured[k + 1].sensor is each.sensor:
-                every[end : ends[k + 1]] = np.nan_to_num(measured[k + 1].values.ravel())  # torques, by the same gauges
-            if not (e.static and name == "force_delay"):
-                found.append(SensorError(name, label, step, every[at], says))
+            every[end - by.size : end] = np.nan_to_num(by.ravel())
+            if torques is not None and name in SHARED:
+                also = next(
+                    a for n, own, _, a, _ in _errors(replace(torques, kind="force")) if (n, own) == (name, label)
+                )
+                every[end : end + also.size] = np.nan_to_num(also.ravel())
+            found.append(SensorError(name, label, step, every[at], says))
     return found
 
 

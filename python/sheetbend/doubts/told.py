@@ -172,7 +172,7 @@ def _step(q: Quantity, value: float, log: bool) -> tuple[bool, float, str] | Non
     """Whether the step of a told quantity is relative, the step, and the step in words; None where none makes sense."""
     if log:
         return True, 0.01, "1 %"
-    if q.name in WIND:
+    if q.name.startswith(WIND):
         return (False, *GROUPS["draft"][1])
     if q.unit in STEPS:
         return (False, *STEPS[q.unit])

@@ -18,6 +18,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..objects.markers import Place
+from ..objects.rod import Rod
 from ..objects.stiffness_field import laplacian_of_triangles
 from ..recording.recording import Recording
 from ..scene.compiled import CompiledScene
@@ -112,6 +113,8 @@ def _pieces(scene: Scene) -> Iterator[tuple[list[int], Array, Array, float]]:
     operator, zero at what is held, and its extent, m."""
     held = scene.pinned | set(scene.boundary.driven)
     for rope in scene.ropes.values():
+        if isinstance(rope, Rod):
+            continue
         n, links = len(rope.particles), np.diff(rope.arc_length)
         laplacian, length = np.zeros((n, n)), np.zeros(n)
         for k, link in enumerate(links):

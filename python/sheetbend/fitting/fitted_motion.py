@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays.timeseries import Array
 from ..doubts.prediction import Comparison
 from ..experiment.driven_motion import corrected
-from ..experiment.found_start import settled
+from ..experiment.found_start import start_nodes
 from ..motion.equilibrium import equilibrium
 from ..motion.simulate import simulate
 from .fit import Fit
@@ -32,7 +32,4 @@ def fitted_positions(found: Fit, c: Comparison, frames: Sequence[int] | slice = 
         return equilibrium(e.scene, values=values).nodes[None]
     at = np.maximum(e.scene_times(c.recording.times[frames], values), 0.0)
     times, which = np.unique(np.rint(at / e.solver.h) * e.solver.h, return_inverse=True)
-    start = settled(e, values) if e.start == "settled" else None
-    if e.start == "equilibrium":
-        start = equilibrium(e.scene, values=values).nodes
-    return simulate(e.scene, times, e.solver, values, start).nodes[which]
+    return simulate(e.scene, times, e.solver, values, start_nodes(e, values)).nodes[which]

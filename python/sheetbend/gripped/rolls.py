@@ -19,13 +19,8 @@ from ..objects.rod_end import spread_turn
 from ..scene.scene import Scene
 from .motion import Array, GrippedMotion
 
-ORDERS = (
-    "1",
-    "2",
-    "11",
-    "12",
-    "22",
-)  # of u, v, u^2, u v and v^2: of the angle's tangent, as no roll is near 90 degrees
+# Of u, v, u^2, u v and v^2: of the angle's tangent, as no roll is near 90 degrees.
+ORDERS = ("1", "2", "11", "12", "22")
 
 
 def lean(direction: Array, nominal: Array) -> Array:

@@ -3,8 +3,8 @@
 The markers of a grip stay where they are; the rope between the grip and the first free marker gets longer or shorter.
 Their distance is that length, less what bends take off it: a quadratic form of the angles between the grip, this link
 and the next; and less what a clock of the grips that is late makes of their speed. What is left jumps where the rope
-slips. The grips of a fit are then moved along the rope by what has
-slipped, so that they hold the same piece of it all the time. Predictions do not know of a slip that comes.
+slips. The grips of a fit are then moved along the rope by what has slipped, so that they hold the same piece of it all
+the time. Predictions do not know of a slip that comes.
 """
 
 from __future__ import annotations

@@ -54,4 +54,8 @@ def _one(s: Seen, order: tuple[int, ...]) -> None:
         fix = "name the markers of one rope with --markers, such as --markers " + repr(
             ",".join(s.recording.markers[k] for k in sorted(two[0]))
         )
-        raise RecordingError("markers", "are those of two ropes", f"{first}; and {second}", fix)
+        fix += (
+            "; of one rope, record markers between them, or write the configuration by hand, see docs/configuration.md"
+        )
+        problem = "are those of two ropes, or of one with a long part that no marker shows"
+        raise RecordingError("markers", problem, f"{first}; and {second}", fix)

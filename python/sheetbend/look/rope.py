@@ -171,7 +171,12 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
 
 def _without_others(takes: Sequence[Take], measured: Measured, kept: list[str]) -> Description | None:
     """The rope alone, where a rigid body far from it is in the same recording."""
-    alone = [replace(take, seen=take.seen.of(take.seen.recording.select(kept))) for take in takes]
+    alone = [
+        replace(take, seen=take.seen.of(take.seen.recording.select(kept)))
+        if set(kept) <= set(take.seen.recording.markers)
+        else take
+        for take in takes
+    ]
     found = describe(alone, measured)
     if found is not None:
         others = [name for name in takes[0].seen.recording.markers if name not in kept]

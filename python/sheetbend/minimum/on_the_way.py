@@ -48,7 +48,7 @@ class OnTheWay(ABC):
 
     @property
     def corrects_markers(self) -> bool:
-        """Whether the latter are among them."""
+        """Whether corrections of driven markers are solved for."""
         return self._corrected is None and any(e.driven_noise is not None for e in self.experiments)
 
     def corrections(self, u: np.ndarray) -> dict[str, np.ndarray]:

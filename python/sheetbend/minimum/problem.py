@@ -117,8 +117,8 @@ class FitProblem(OnTheWay):
         return FitProblem(experiments, self.given, self.recordings, self.threads, self.parameters)
 
     def follow(self, other: FitProblem) -> FitProblem:
-        """This problem, with corrections that begin where those of another one of the same recordings ended: most of
-        the search for them is saved."""
+        """This problem, with corrections that begin where those of another one ended, of the same recordings or of
+        parts of them: most of the search for them is saved."""
         if self is not other and self.estimates_corrections and other.estimates_corrections:
             self.core.follow(other.core)
         return self

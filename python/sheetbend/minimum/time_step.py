@@ -26,6 +26,7 @@ TIME_STEP, SWEEPS = "time step", "twice the sweeps"
 TANGENTS = 3  # evaluations with tangents at most
 THERE = 0.1  # standard errors, in the mean of all parameters: a step shorter than this has arrived
 APART = 0.5  # standard errors, by which the limit wants a parameter elsewhere
+AT = 1e-6  # of the size of a parameter that is no logarithm: so near a limit it has run off
 SEARCHED, TOLERANCE = 50, 1e-8  # of a search of combined runs: iterations at most, and relative change of the cost
 SECOND_ORDER, THIRD_ORDER = 4.0 / 3.0, 8.0 / 7.0  # from what a halving moves to the limit
 
@@ -68,9 +69,13 @@ def settle(problem: FitProblem, u: np.ndarray, optimizer: str = "auto") -> Settl
         if all(map(can_be_combined, problem.experiments)):
             try:
                 limit = problem.of(combined(problem.experiments))
-                return _back(problem, limit, u, _moved(problem, limit, u), optimizer)
+                found = _moved(problem, limit, u)
             except SheetbendError:  # a run at a fourth of the substep may have no answer where one at half has
-                pass
+                return _counted_whole(problem, u)
+            try:
+                return _back(problem, limit, u, found, optimizer)
+            except SheetbendError as error:
+                return replace(found, warnings=(*found.warnings, f"combined runs could not be fitted: {error}"))
         return _counted_whole(problem, u)
     except SheetbendError as error:
         return Settled(problem, u, not_counted=(f"{TIME_STEP} not counted: {error}",))
@@ -130,8 +135,12 @@ def _back(problem: FitProblem, limit: FitProblem, u: np.ndarray, found: Settled,
     """Where a fit of combined runs ends, if the fit at u left parameters at a limit of its search and the combined runs
     want them elsewhere; else what was found."""
     lower, upper = problem.parameters.limits()
-    lost = (u - lower < RESTS) | (upper - u < RESTS)
-    if not lost.any() or not _wanted_elsewhere(problem, u, limit, found.u, np.flatnonzero(lost)):
+    log = np.array([problem.parameters[name].log for name in problem.parameters.free])
+    near = np.where(log, RESTS, AT * np.maximum(np.abs(u), np.abs(problem.parameters.initial())))
+    lost = (u - lower <= near) | (upper - u <= near)
+    if lost.any():
+        lost[lost] = _wanted_elsewhere(problem, u, limit, found.u, np.flatnonzero(lost))
+    if not lost.any():
         return found
     end = refit(limit, np.where(lost, problem.parameters.initial(), found.u), optimizer, SEARCHED, TOLERANCE)
     if not end.cost < found.cost:
@@ -148,15 +157,15 @@ def _back(problem: FitProblem, limit: FitProblem, u: np.ndarray, found: Settled,
 
 def _wanted_elsewhere(
     problem: FitProblem, u: np.ndarray, limit: FitProblem, at: np.ndarray, columns: Iterable[int]
-) -> bool:
-    """Whether the Gauss-Newton steps of a fit at u and of the limit there, both without bounds, differ in one of these
+) -> list[bool]:
+    """Whether the Gauss-Newton steps of a fit at u and of the limit there, both without bounds, differ in each of these
     parameters by a good part of its standard error."""
     _, r, J = problem.evaluate(u)
     _, there, K = limit.evaluate(at)
     apart = solved(K, there) - solved(J, r)
     noise = np.sqrt(there @ there / max(len(there) - len(u), 1))
     own = {k: unexplained(np.delete(K, k, axis=1), K[:, k]) for k in columns}
-    return any(float(np.linalg.norm(apart[k] * column)) > APART * noise for k, column in own.items())
+    return [float(np.linalg.norm(apart[k] * column)) > APART * noise for k, column in own.items()]
 
 
 def _arrived(problem: FitProblem, r: np.ndarray, J: np.ndarray, step: np.ndarray) -> bool:

@@ -133,6 +133,8 @@ def _known(
     moves[:own, :count] = body.slope * body.steps / body.sizes[:, None]
     moves[range(own, len(labels)), range(count, len(columns))] = 1.0
     seen, unseen = _split(rows[:, columns] * steps, count)
+    if not len(seen):
+        return "nothing is known of their mass, center and inertia"
     away = moves @ unseen
     varied = np.abs(moves).max(axis=1) > _SAME**2
     sure = np.flatnonzero(varied & (np.abs(away).max(axis=1, initial=0.0) < _SAME))
@@ -157,6 +159,8 @@ def _split(J: Array, count: int) -> tuple[Array, Array]:
     size = np.linalg.norm(J, axis=0)
     heard = size > 0.0
     heard[:count] = size[:count] > max(_SEEN * size[:count].max(initial=0.0), 1.0)
+    if not heard.any():
+        return np.zeros((0, len(size))), np.eye(len(size))
     triangle = np.linalg.qr(J[:, heard] / size[heard], mode="r")
     _, values, right = np.linalg.svd(triangle)
     rank = int((values > RANK_TOLERANCE * values[0]).sum())
