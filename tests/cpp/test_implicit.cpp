@@ -133,8 +133,8 @@ TEST(ImplicitBlocks, AreNotSolvedOnTheWayBack) {
 }
 
 TEST(ImplicitBlocks, RefuseWhatTheyCannotHold) {
-  for (const SceneShape& shape : {SceneShape{}, SceneShape{.unilateral = true, .directors = false},
-                                  SceneShape{.volumes = true, .directors = false}})
+  for (const SceneShape& shape :
+       {SceneShape{.unilateral = true, .directors = false}, SceneShape{.volumes = true, .directors = false}})
     EXPECT_THROW(make_plan(random_scene(1, shape).scene, {.partition = Partition::implicit}), std::invalid_argument);
   const Sample sample = random_scene(1, {.directors = false});
   for (const double bad : {0.0, 1.0, std::nan("")})

@@ -10,7 +10,8 @@ from ..arrays.timeseries import mean_position
 from .seen import Seen
 
 QUIET = 0.6  # of the rest, in which nothing moves yet: its end is where the motion exceeds the noise
-EARLY = 0.05  # s, in which the speed at the first frame is looked for
+EARLY, LATEST = 0.05, 0.1  # s, in which the speed at the first frame is looked for, and where that is too few frames
+FRAMES = 6  # that tell it
 
 
 def lets_go(s: Seen, order: Sequence[int]) -> bool:
@@ -20,9 +21,11 @@ def lets_go(s: Seen, order: Sequence[int]) -> bool:
     r = s.recording
     t = r.times - r.times[0]
     early = np.flatnonzero(t <= EARLY)
+    if len(early) < FRAMES:
+        early = np.flatnonzero(t <= LATEST)[:FRAMES]
     x = r.positions[early][:, list(order)]
     x = x[:, np.isfinite(x).all(axis=(0, 2))]
-    if len(early) < 6 or not x.shape[1] or not s.noise:
+    if len(early) < FRAMES or not x.shape[1] or not s.noise:
         return False
     slope = np.linalg.lstsq(np.vander(t[early], 3, increasing=True), x.reshape(len(early), -1), rcond=None)[0][1]
     return bool(np.abs(slope).max() < 4.0 * s.noise * np.sqrt(192 / len(early)) / t[early[-1]])
