@@ -1,4 +1,4 @@
-"""Sliding over curved shapes without friction, against closed forms: a chain off a table, a particle around a post."""
+"""Sliding against closed forms: a block on an incline, a chain off a table, a particle around a post."""
 
 from __future__ import annotations
 
@@ -47,3 +47,19 @@ def test_a_particle_that_is_drawn_around_a_post_leaves_it_at_its_side():
     seed[1, 0, 0] = 1.0
     by_start = rollout.gradient(seed).inputs["position"].reshape(-1, 3)[0]
     assert by_start @ [-np.sin(start), np.cos(start), 0.0] == pytest.approx(-1.0 / np.sin(start), rel=2e-3)
+
+
+@pytest.mark.parametrize("method", ["implicit", "gauss_seidel"])
+def test_a_block_slides_down_an_incline_as_coulomb_says(method: str):
+    """x = g (sin a - mu cos a) t^2/2, which N substeps of backward Euler make larger by a share of 1/N."""
+    slope, friction, h, steps = np.radians(30.0), 0.3, 1e-3, 1000
+    scene = sb.Scene("incline", gravity=(G * np.sin(slope), 0, -G * np.cos(slope)))
+    scene.contact(scene.add_particles([[0, 0, 0]], 0.2), sb.Plane(name="table"), friction=friction)
+    solver = sb.Solver(h=h, method=method, integrator="bdf1", iterations=100 if method == "implicit" else 1)
+    rollout = sb.rollout(scene, [0.0, steps * h], solver)
+    half = 0.5 * h**2 * steps * (steps + 1)
+    assert rollout.positions[1, 0, 0] == pytest.approx(G * (np.sin(slope) - friction * np.cos(slope)) * half, rel=2e-5)
+    seed = np.zeros_like(rollout.positions)
+    seed[1, 0, 0] = 1.0
+    by_friction = rollout.gradient(seed).quantities["table_friction"]
+    assert by_friction == pytest.approx(-G * np.cos(slope) * half, rel=2e-5)

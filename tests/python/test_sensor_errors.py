@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import sheetbend as sb
 import test_forces_fit as shaken
+from sheetbend.doubts.given import premises
 from sheetbend.doubts.sensor_errors import SensorError, sensor_errors
 from sheetbend.doubts.told import told_numbers
 from sheetbend.experiment.wanted import as_parameters
@@ -112,6 +113,17 @@ def test_what_a_sensor_has_a_number_for_is_not_told(exact) -> None:
     assert set(errors) == {"size of wrist", *(f"wrist about {axis}" for axis in "xyz")}
     _, _, errors = asked(watched(exact, exact[2], axes="z"))
     assert "force zero of wrist along z" in errors and "force zero of wrist along x" not in errors
+
+
+def test_the_zero_of_each_sensor_has_its_own_step(exact) -> None:
+    e = watched(exact, replace(exact[2], torques=None))
+    coarse = replace(e.forces[0], name="cell", sigma=100 * SIGMA)
+    both = replace(e, forces=[*e.forces, coarse])
+    problem = FitProblem([both], as_parameters(["rod_EI"], [both]))
+    u = problem.parameters.initial()
+    steps = {one.name: one.off_by for one in premises(problem, u, {}, told_numbers(problem, u)[0])}
+    assert steps["force zero of wrist along x"] == pytest.approx(SIGMA)
+    assert steps["force zero of cell along x"] == pytest.approx(100 * SIGMA)
 
 
 def fitted(exact, change) -> sb.FitResult:
