@@ -140,6 +140,10 @@ def test_a_start_needs_frames_markers_and_plain_runs() -> None:
         problem_of(replace(e, fit=(e.t0, e.t0 + 1.5 / RATE)))
     with pytest.raises(sb.InputError, match=r"start: does not go with runs that are extrapolated"):
         problem_of(replace(e, solver=replace(SOLVER, extrapolate=2)))
+    rod = sb.rod(0.5, 8, density=0.05, EI=1e-3, GJ=1e-3)
+    places = [sb.on_particle(k) for k in range(2, 2 + len(e.markers))]
+    with pytest.raises(sb.InputError, match=r"without markers on ropes or cloths.*not a rod"):
+        sb.fit(replace(e, scene=rod, markers=places), parameters=["rod_EI"])
     with pytest.raises(sb.InputError, match="start: is not estimated of many recordings"):
         sb.fit_many([replace(e, name=str(k)) for k in range(20)], WANTED)
     with pytest.raises(sb.InputError, match="from a motion with `start`"):

@@ -78,7 +78,7 @@ class EstimatedStart:
                         target.append(slots + axis)
                         weight.append(column)
         if not kinds:
-            fix = "place a marker on a rope or cloth that can move, or use start = 'given'"
+            fix = "place a marker on a rope (not a rod) or cloth that can move, or use start = 'given'"
             raise InputError(
                 f"{name}.start", "cannot be estimated without markers on ropes or cloths", "estimated", fix
             )
