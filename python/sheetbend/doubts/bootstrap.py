@@ -50,7 +50,8 @@ def check_bootstrap(draws: int, problem: FitProblem) -> None:
         given = {"driven_sigma": e.driven_sigma, "shooting": e.shooting, "start": e.start == "estimated" or None}
         for key in (key for key, value in given.items() if value is not None):
             fix = f"leave out `bootstrap`, or `{key}` of {e.name!r}"
-            raise InputError("bootstrap", f"cannot draw from a motion with `{key}`, whose own unknowns tie its residuals together", draws, fix)
+            told = f"cannot draw from a motion with `{key}`: its residuals have unknowns in common"
+            raise InputError("bootstrap", told, draws, fix)
 
 
 def bootstrap(problem: FitProblem, u: Array, draws: int, autocorrelation_time: float) -> tuple[Bootstrap | None, str]:
