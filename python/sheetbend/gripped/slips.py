@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..quantities.wording import short
+from ..statistics.least_squares import unexplained
 from .motion import Array, GrippedMotion, chords_of, fractions_of
 
 LEAST = 1e-3  # m, that a slip is told from
@@ -86,11 +87,11 @@ def _through(motion: GrippedMotion, end: bool) -> list[Slip]:
     grip, first, second = np.moveaxis(links / lengths[..., None], 1, 0)
     lateness = (motion.velocities[seen, inner] * first).sum(axis=1)
     bends = np.column_stack([_products(first - grip, second - first), lateness])
-    one, both = _left(lengths[:, 1], bends), _left(lengths[:, 1] + lengths[:, 2], bends)
+    one, both = unexplained(bends, np.column_stack([lengths[:, 1], lengths[:, 1] + lengths[:, 2]])).T
+    ramps = unexplained(bends, _ramp(times[:, None], places[None]))
+    size = np.square(ramps).sum(axis=0)
     found: list[Slip] = []
     while len(found) < MOST and len(places):
-        ramps = _left(_ramp(times[:, None], places[None]), bends)
-        size = np.square(ramps).sum(axis=0)
         by = ramps.T @ one / size
         k = int(np.argmax(by**2 * size))
         shared = float(np.sign(by[k]) * (ramps[:, k] @ both) / size[k])
@@ -108,9 +109,3 @@ def _ramp(times: Array, middle: float | Array) -> Array:
 def _products(a: Array, b: Array) -> Array:
     """(frames, 4): a constant, and the products of two vectors (frames, 3) with each other."""
     return np.stack([np.ones(len(a)), (a * a).sum(axis=1), (a * b).sum(axis=1), (b * b).sum(axis=1)], axis=1)
-
-
-def _left(values: Array, columns: Array) -> Array:
-    """What least squares of these columns leave of values (frames,) or (frames, places)."""
-    q = np.linalg.qr(columns)[0]
-    return np.asarray(values - q @ (q.T @ values))
