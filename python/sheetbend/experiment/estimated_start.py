@@ -19,7 +19,7 @@ import numpy as np
 from ..errors import InputError
 from ..objects.markers import Place
 from ..objects.rod import Rod
-from ..objects.stiffness_field import laplacian_of_triangles
+from ..objects.stiffness_field import laplacian_of_triangles, modes_of_laplacian, shares
 from ..recording.recording import Recording
 from ..scene.compiled import CompiledScene
 from ..scene.scene import Scene
@@ -64,8 +64,9 @@ class EstimatedStart:
             own = [k for k, place in enumerate(places) if place.body is None and set(place.particles) <= set(nodes)]
             if not own or not len(values):
                 continue
-            free = {node: k for k, node in enumerate(nodes)}
-            at = np.array([_seen(places[k], shapes, free) for k in own])
+            every = np.zeros((max(nodes) + 1, len(values)))
+            every[nodes] = shapes
+            at = np.array([_at(places[k], every) for k in own])
             for kind, shown, noise in ((0, moved[:, own], sigma), (1, rates[:, own], np.sqrt(2.0) * sigma / between)):
                 deviations = _likeliest(values, at, shown, noise, extent)
                 kept = deviations >= LEAST * deviations.max()
@@ -132,20 +133,15 @@ def _modes(
 ) -> tuple[list[int], Array, Array, float]:
     """Modes of mean square 1, smoothest first."""
     free = np.array([node not in held for node in nodes])
-    own = sizes[free]
-    values, vectors = np.linalg.eigh(laplacian[np.ix_(free, free)] / np.sqrt(np.outer(own, own)))
+    values, moving = modes_of_laplacian(laplacian[np.ix_(free, free)], sizes[free], float(sizes.sum()))
     shapes = np.zeros((len(nodes), len(values)))
-    shapes[free] = vectors / np.sqrt(own / sizes.sum())[:, None]
-    return nodes, np.maximum(values, 0.0), shapes, extent
+    shapes[free] = moving
+    return nodes, values, shapes, extent
 
 
-def _seen(place: Place, shapes: Array, row: dict[int, int]) -> Array:
-    """(modes,) of what a marker shows of them."""
-    return sum((w * shapes[row[p]] for p, w in zip(place.particles, place.weights, strict=True)), shapes[0] * 0.0)
-
-
-def _at(x: Array, place: Place) -> Array:
-    return np.asarray(np.array(place.weights) @ x[list(place.particles)][: len(place.weights)])
+def _at(place: Place, field: Array) -> Array:
+    """What a marker shows of a field (nodes, ...)."""
+    return np.asarray(np.array(place.weights) @ field[list(place.particles)])
 
 
 def _shown(scene: Scene, places: Sequence[Place], r: Recording) -> tuple[Array, Array]:
@@ -153,7 +149,7 @@ def _shown(scene: Scene, places: Sequence[Place], r: Recording) -> tuple[Array, 
     much their velocities differ from those that it starts with; NaN where they are not seen."""
     x, v = fields_at(scene.compiled, scene.compiled.inputs())
     rates = (r.positions[2:] - r.positions[:-2]) / (r.times[2:] - r.times[:-2])[:, None, None]
-    before = [np.array([_at(field, place) for place in places]) for field in (x, v)]
+    before = [np.array([_at(place, field) for place in places]) for field in (x, v)]
     return np.asarray(r.positions - before[0]), np.asarray(rates - before[1])
 
 
@@ -171,8 +167,7 @@ def _likeliest(values: Array, at: Array, shown: Array, noise: float, extent: flo
     rms = max(float(np.sqrt(np.mean(y**2))), noise)
     best, found = np.inf, np.zeros(len(values))
     for length in LENGTHS * extent:
-        falls = 1.0 / (1.0 + length**2 * values)
-        falls /= np.sqrt(np.sum(falls**2))
+        falls = shares(values, length)
         spread, axes = np.linalg.eigh((at * falls**2) @ at.T)
         square = np.mean((axes.T @ y) ** 2, axis=1)
         for size in SIZES * rms:

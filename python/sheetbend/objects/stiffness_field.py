@@ -69,8 +69,13 @@ class StiffnessField:
         return np.asarray(np.sum((self.finer * self._of_all(size, length)[len(self.modes) :]) ** 2, axis=1))
 
     def _of_all(self, size: float, length: float) -> Array:
-        falls = 1.0 / (1.0 + length**2 * self.eigenvalues[1:])
-        return np.asarray(size * (falls / np.sqrt(np.sum(falls**2))))
+        return np.asarray(size * shares(self.eigenvalues[1:], length))
+
+
+def shares(eigenvalues: Array, length: float) -> Array:
+    """(modes,) deviations of a prior with a length of correlation, m, and a root mean square of 1 in all."""
+    falls = 1.0 / (1.0 + length**2 * eigenvalues)
+    return np.asarray(falls / np.sqrt(np.sum(falls**2)))
 
 
 def field_of_modes(
@@ -126,9 +131,15 @@ def modes_of_triangles(corners: Array, triangles: NDArray[np.intp]) -> tuple[Arr
         triangles: (triangles, 3) vertices.
     """
     _, places, laplacian, area = laplacian_of_triangles(corners, triangles)
-    values, vectors = np.linalg.eigh(laplacian / np.sqrt(np.outer(area, area)))
-    shapes = _signed(vectors / np.sqrt(area / area.sum())[:, None])
-    return np.maximum(values, 0.0), shapes[places].mean(axis=1)
+    values, shapes = modes_of_laplacian(laplacian, area, float(area.sum()))
+    return values, _signed(shapes)[places].mean(axis=1)
+
+
+def modes_of_laplacian(laplacian: Array, sizes: Array, whole: float) -> tuple[Array, Array]:
+    """Eigenvalues (n,) 1/m^2 and eigenvectors (n, n) of a Laplace operator on vertices of these sizes (n,), whose mean
+    square over the whole is 1."""
+    values, vectors = np.linalg.eigh(laplacian / np.sqrt(np.outer(sizes, sizes)))
+    return np.maximum(values, 0.0), np.asarray(vectors / np.sqrt(sizes / whole)[:, None])
 
 
 def laplacian_of_triangles(
