@@ -20,7 +20,6 @@ from ..minimum.problem import FitProblem
 from ..quantities.wording import short
 
 Says = Callable[[float], str]
-SHARED = ("force_size", "force_direction", "force_delay")  # of the forces and the torques of one sensor
 
 
 @dataclass(frozen=True)
@@ -52,6 +51,9 @@ class _Readings:
     zeros: str
 
 
+Change = Callable[[_Readings], Array]
+
+
 def sensor_errors(problem: FitProblem, u: Array, i: int) -> list[SensorError]:
     """Of the sensors of the i-th experiment at u (free,); none where it has none, or where motions have corrections.
     Takes two evaluations of the residuals without derivatives.
@@ -67,28 +69,26 @@ def sensor_errors(problem: FitProblem, u: Array, i: int) -> list[SensorError]:
     numbers = [end - each.values.size + np.arange(each.values.size) for end, each in zip(ends, measured, strict=True)]
     numbered = replace(e, forces=_moved(e.forces, measured, numbers))
     there = problem.of([numbered if k == i else other for k, other in enumerate(problem.experiments)])
-    own = slice(*problem.core.first_rows[i : i + 2])
+    rows = slice(*problem.core.first_rows[i : i + 2])
     _, r, _ = problem.evaluate(u, jacobian=False)
     ok, more, _ = there.evaluate(u, jacobian=False)
     if not ok:
         raise SheetbendError(there.failure)
-    at = np.rint(r[own] - more[own]).astype(np.int64) - 1  # place among all readings, -1 of what is none
+    at = np.rint(r[rows] - more[rows]).astype(np.int64) - 1  # place among all readings, -1 of what is none
     compared = at >= 0
     simulated = np.concatenate([each.values.ravel() for each in measured])
-    simulated[at[compared]] += r[own][compared]
+    simulated[at[compared]] += r[rows][compared]
     parts = np.split(simulated.reshape(-1, 3), ends[:-1] // 3)
     measured = [replace(each, values=values) for each, values in zip(measured, parts, strict=True)]
     found = []
-    for k, (end, each) in enumerate(zip(ends, measured, strict=True)):
-        torques = next((other for other in measured[k + 1 : k + 2] if other.sensor is each.sensor), None)
-        for name, label, step, by, says in _errors(each):
+    for sensor in e.forces:
+        own = [(end, each) for end, each in zip(ends, measured, strict=True) if each.sensor is sensor]
+        told = [(error, own) for error in _of_sensor(sensor)]
+        told += [(error, [one]) for one in own for error in _zeros(one[1])]
+        for (name, label, step, change, says), changed in told:
             every = np.zeros(ends[-1] + 1)
-            every[end - by.size : end] = np.nan_to_num(by.ravel())
-            if torques is not None and name in SHARED:
-                also = next(
-                    a for n, own, _, a, _ in _errors(replace(torques, kind="force")) if (n, own) == (name, label)
-                )
-                every[end : end + also.size] = np.nan_to_num(also.ravel())
+            for end, each in changed:
+                every[end - each.values.size : end] = np.nan_to_num(change(each).ravel())
             found.append(SensorError(name, label, step, every[at], says))
     return found
 
@@ -118,21 +118,41 @@ def _moved(
     return made
 
 
-def _errors(each: _Readings) -> Iterator[tuple[str, str, tuple[float, str], Array, Says]]:
-    """Name, label, step, what one unit of it adds to (samples, 3) readings over sigma, and what a size of it says."""
-    name, unit = each.sensor.name, "N" if each.kind == "force" else "N m"
-    if each.kind == "force":
-        yield "force_size", f"size of {name}", (0.01, "1 %"), each.values, _reads(name)
-        if each.sensor.delay is None and len(each.values) > 1:
-            late = -np.gradient(each.values, each.sensor.recording.times, axis=0)
-            yield "force_delay", f"clock of {name}", (1e-3, "1 ms"), late, _late(name)
-        for axis, turn in zip("xyz", np.eye(3), strict=True):
-            step = math.radians(1.0), "1 degree"
-            yield "force_direction", f"{name} about {axis}", step, -np.cross(turn, each.values), _turned(name, axis)
-    for axis in each.zeros:
-        one = np.broadcast_to(np.eye(3)["xyz".index(axis)] / each.sigma, each.values.shape)
-        step = each.sigma, f"{short(each.sigma, 2)} {unit}"
-        yield f"{each.kind}_zero", f"{each.kind} zero of {name} along {axis}", step, one, _off(name, axis, unit)
+def _of_sensor(sensor: ForceSensor) -> Iterator[tuple[str, str, tuple[float, str], Change, Says]]:
+    """Name, label, step, what one unit of it adds to readings over sigma, and what a size of it says: of errors that
+    forces and torques share."""
+    name, times = sensor.name, sensor.recording.times
+    yield "force_size", f"size of {name}", (0.01, "1 %"), lambda each: each.values, _reads(name)
+    if sensor.delay is None and len(times) > 1:
+        yield "force_delay", f"clock of {name}", (1e-3, "1 ms"), _delay(times), _late(name)
+    for axis in "xyz":
+        step = math.radians(1.0), "1 degree"
+        yield "force_direction", f"{name} about {axis}", step, _turn(axis), _turned(name, axis)
+
+
+def _zeros(own: _Readings) -> Iterator[tuple[str, str, tuple[float, str], Change, Says]]:
+    """The same of the zeros of forces, or of torques."""
+    name, unit = own.sensor.name, "N" if own.kind == "force" else "N m"
+    for axis in own.zeros:
+        step = own.sigma, f"{short(own.sigma, 2)} {unit}"
+        label = f"{own.kind} zero of {name} along {axis}"
+        yield f"{own.kind}_zero", label, step, _shift(axis), _off(name, axis, unit)
+
+
+def _delay(times: Array) -> Change:
+    return lambda each: -np.gradient(each.values, times, axis=0)
+
+
+def _turn(axis: str) -> Change:
+    return lambda each: -np.cross(_unit(axis), each.values)
+
+
+def _shift(axis: str) -> Change:
+    return lambda each: np.broadcast_to(_unit(axis) / each.sigma, each.values.shape)
+
+
+def _unit(axis: str) -> Array:
+    return np.eye(3)["xyz".index(axis)]
 
 
 def _reads(name: str) -> Says:

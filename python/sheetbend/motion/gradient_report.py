@@ -63,7 +63,7 @@ class GradientReport:
         return all(row.passed for row in self.rows) and self.dot_product <= DOT_PRODUCT_BOUND
 
     def to_dict(self) -> dict[str, Any]:
-        """Values for JSON: each gradient by name, with its relative errors and whether it passed."""
+        """Values for JSON: under each name, the gradient's relative errors and whether they are within their bounds."""
         gradients = {
             r.name: {
                 "size": r.size,
