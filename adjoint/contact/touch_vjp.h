@@ -117,4 +117,13 @@ Vec3<S> turn_by_vjp(const Vec3<S>& r, const S* turn_bar) {
   return Vec3<S>(r_bar);
 }
 
+// Reverse of a contact's force on a point at x, both in the world's frame: adds to the cotangents of the numbers and of the pose, and returns that of x.
+// `at` is the touch there.
+template <class S>
+Vec3<S> push_vjp(const AnyShape& shape, const Pose<S>& pose, const Vec3<S>& x, const ContactNumbers<S>& numbers,
+                 const Touch<S>& at, const Vec3<S>& bar, ContactNumbers<S>& numbers_bar, Pose<S>& pose_bar) {
+  const Vec3<S> none(S(0.0), S(0.0), S(0.0)), force_bar = turned_vjp(pose, at.force, bar, pose_bar);
+  return in_frame_vjp(pose, x, touch_vjp(shape, pose.in_frame(x), numbers, force_bar, none, numbers_bar), pose_bar);
+}
+
 }  // namespace sheetbend

@@ -36,14 +36,11 @@ struct BlockContactCotangents {
                     const Vec3<S>& p, Vec3<S>& force) {
     const BlockContact& own = block.contacts[i];
     const Pose<S>& pose = contacts.pose(block, i);
-    const Vec3<S> z = pose.in_frame(x), none(S(0.0), S(0.0), S(0.0));
-    const Touch<S> at = touch(own.shape, z, contacts.numbers[i]);
-    force = none;
-    if (!at.pushes) return none;
+    const Touch<S> at = touch(own.shape, pose.in_frame(x), contacts.numbers[i]);
+    force = Vec3<S>(S(0.0), S(0.0), S(0.0));
+    if (!at.pushes) return force;
     force = pose.turned(at.force);
-    const Vec3<S> force_bar = turned_vjp(pose, at.force, p, poses[own.collider]);
-    const Vec3<S> z_bar = touch_vjp(own.shape, z, contacts.numbers[i], force_bar, none, numbers[i]);
-    return in_frame_vjp(pose, x, z_bar, poses[own.collider]);
+    return push_vjp(own.shape, pose, x, contacts.numbers[i], at, p, numbers[i], poses[own.collider]);
   }
 };
 

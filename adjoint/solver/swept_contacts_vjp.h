@@ -33,25 +33,16 @@ struct SweptContactCotangents {
   }
 };
 
-// Of the force at x: adds to the cotangents of the numbers and of the pose, and returns (dF/dx)^T s.
-template <class S>
-Vec3<S> push_vjp(const AnyShape& shape, const Pose<S>& pose, const Vec3<S>& x, const ContactNumbers<S>& numbers,
-                 const Vec3<S>& s, ContactNumbers<S>& numbers_bar, Pose<S>& pose_bar) {
-  const Vec3<S> z = pose.in_frame(x), none(S(0.0), S(0.0), S(0.0));
-  const Vec3<S> force_bar = turned_vjp(pose, touch(shape, z, numbers).force, s, pose_bar);
-  return in_frame_vjp(pose, x, touch_vjp(shape, z, numbers, force_bar, none, numbers_bar), pose_bar);
-}
-
 // s = (I - w dF/dx)^-T b. A second pass carries what a larger scalar has beside its values.
 template <class S>
 Vec3<S> transposed_balance(const AnyShape& shape, const Pose<S>& pose, const Vec3<S>& x, const S& w,
-                           const ContactNumbers<S>& numbers, const Vec3<S>& b) {
+                           const ContactNumbers<S>& numbers, const Touch<S>& at, const Vec3<S>& b) {
   const Inverse3 inverse = balance_inverse(shape, values_of(pose.in_frame(x)), value_of(w), values_of(numbers));
   const auto solved = [&](const Vec3<S>& v) { return pose.turned(inverse.transposed_times(pose.turned_back(v))); };
   const Vec3<S> s = solved(b);
   ContactNumbers<S> unused{};
   Pose<S> unused_pose{};
-  return s + solved(b - s + w * push_vjp(shape, pose, x, numbers, s, unused, unused_pose));
+  return s + solved(b - s + w * push_vjp(shape, pose, x, numbers, at, s, unused, unused_pose));
 }
 
 // Reverse of project_contacts(): q_bar goes from the cotangent of the coordinates after a pass to that of those before; w_bar is added to.
@@ -72,8 +63,9 @@ void project_contacts_vjp(const ContactSource<T>& source, const Plan& plan, int 
     if (push.pushes) {
       const Pose<S>& pose = contacts.poses.next[c.collider];
       const ContactNumbers<S>& numbers = contacts.numbers[i];
-      const Vec3<S> s = transposed_balance(c.shape, pose, push.x, w, numbers, bar.force[i] + w * x_bar);
-      y_bar = x_bar + push_vjp(c.shape, pose, push.x, numbers, s, bar.numbers[i], bar.poses[c.collider]);
+      const Touch<S> at = touch(c.shape, pose.in_frame(push.x), numbers);
+      const Vec3<S> s = transposed_balance(c.shape, pose, push.x, w, numbers, at, bar.force[i] + w * x_bar);
+      y_bar = x_bar + push_vjp(c.shape, pose, push.x, numbers, at, s, bar.numbers[i], bar.poses[c.collider]);
       own_w_bar += dot(push.force, y_bar);
     }
     bar.force[i] = Vec3<S>(S(0.0), S(0.0), S(0.0));

@@ -36,7 +36,7 @@ struct ReverseOf<CarryFriction> {
       const Vec3<S> carried_bar = source.at(bar.x_next, contact.carried[i]), tangential_bar = rate * carried_bar;
       const auto at = [&](int node) { return source.read(Vec3<T>(work.q.of(node))); };
       const Vec3<S> x = source.point_at(contact, i, at);
-      if (!contact.rebounds(i) && !(value_of(source.gap(poses.next[contact.collider], c, x)) < 0.0)) return;
+      if (source.is_apart(poses.next[contact.collider], c, i, x)) return;
       const ContactNumbers<S> numbers = source.numbers(poses, c, i);
       ContactNumbers<S> numbers_bar{};
       const Vec3<S> z = poses.next[contact.collider].in_frame(x);

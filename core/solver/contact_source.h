@@ -171,6 +171,10 @@ struct ContactSource {
     distance_from(collider.any(), at, size, distance, n);
     return distance - read(in.of(Quantity::contact_radius)[contact]);
   }
+  // Whether a contact does nothing to a point at x, judged by its place alone: where restitution may lift it, that does not tell.
+  bool is_apart(const Pose<S>& pose, int contact, int item, const Vec3<S>& x) const {
+    return !scene.contacts[contact].rebounds(item) && !(value_of(gap(pose, contact, x)) < 0.0);
+  }
 };
 
 }  // namespace sheetbend

@@ -24,8 +24,8 @@ struct SweptContacts {
   };
   ColliderPoses<S> poses;
   std::vector<ContactNumbers<S>> numbers;  // per contact of the plan; of those that have not come near, radius and size
-  std::vector<char>
-      near;  // likewise: whether its numbers are at hand: a pass found it below the surface, or it rebounds
+  // Likewise: whether all its numbers are at hand, because a pass found it below the surface, or it rebounds.
+  std::vector<char> near;
   std::vector<Push> pushes;  // contact after contact, of all passes or the last one
 
   void resize(const Plan& plan, int kept_iterations) {

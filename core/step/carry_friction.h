@@ -51,7 +51,7 @@ struct CarryFriction {
       const auto x = source.point(contact, i, work.x_next);
       ContactMode& mode = record.modes[source.lane * count + contact.first + i];
       T* const kept = work.x_next + scene.first_dof[contact.carried[i]];
-      if (!contact.rebounds(i) && !(value_of(source.gap(poses.next[contact.collider], c, x)) < 0.0)) {
+      if (source.is_apart(poses.next[contact.collider], c, i, x)) {
         mode = ContactMode::apart;
         return source.write(Vec3<S>(S(0.0), S(0.0), S(0.0)), kept);
       }
