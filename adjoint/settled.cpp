@@ -22,9 +22,18 @@ void for_each_pinned(const Scene& scene, F&& f) {
     for (int d = 0; scene.role[n] == Role::pinned && d < 3; ++d) f(scene.first_dof[n] + d);
 }
 
+constexpr double settling_share = 1e-3;  // of a substep
+constexpr int settling_iterations = 10;  // of Newton, or more
+
 double before(const Plan& settling, double t0) { return t0 - settling.options.h; }
 
 }  // namespace
+
+Plan settling_plan(const Scene& scene, SolverOptions options) {
+  options.h *= settling_share;
+  options.iterations = std::max(options.iterations, settling_iterations);
+  return make_plan(scene, options);
+}
 
 template <class T>
 std::vector<T> settled_coordinates(const Scene& scene, const Plan& settling, const T* inputs, double t0) {

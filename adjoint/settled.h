@@ -9,8 +9,8 @@
 
 namespace sheetbend {
 
-inline constexpr double settling_substep = 1e-3;  // of a substep
-inline constexpr int settling_iterations = 10;    // of Newton, or more
+// That substep of a solver with these options.
+Plan settling_plan(const Scene& scene, SolverOptions options);
 
 // Coordinates (dofs). Throws what a rollout throws. T: double, Dual<double, 4>, Dual<double, 8>.
 template <class T>

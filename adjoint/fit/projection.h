@@ -19,9 +19,8 @@ namespace sheetbend {
 struct NoCorrection : std::runtime_error {
   NoCorrection()
       : std::runtime_error(
-            "what is estimated along the way (a start, the motion of driven markers) did not converge. Fix: start "
-            "nearer, "
-            "or fit a shorter window first") {}
+            "what is estimated along the way (a start, the motion of driven markers) did not converge. "
+            "Fix: start nearer, or fit a shorter window first") {}
 };
 
 class Projection {

@@ -119,11 +119,7 @@ Experiment make_experiment(const py::dict& d) {
   if (!d["correction"].is_none()) e.correction = make_correction(get<py::dict>(d, "correction"));
   e.is_static = get<bool>(d, "is_static");
   e.start = start_of(get<std::string>(d, "start"));
-  if (e.start == Start::settled) {
-    o.h = settling_substep * e.plan.options.h;
-    o.iterations = std::max(o.iterations, settling_iterations);
-    e.settling = make_plan(*e.scene, o);
-  }
+  if (e.start == Start::settled) e.settling = settling_plan(*e.scene, e.plan.options);
   e.t0 = get<double>(d, "t0");
   e.equilibrium.t0 = e.t0;
   return e;

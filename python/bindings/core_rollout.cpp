@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "adjoint/rollout.h"
+#include "adjoint/settled.h"
 #include "core/rollout/contact_counts.h"
 #include "core/rollout/redundant_rows.h"
 #include "python/bindings/solver.h"
@@ -116,6 +117,16 @@ std::vector<std::vector<std::vector<double>>> force_balance(const Solver& s, con
   return all;
 }
 
+// Where a start that settles (adjoint/settled.h) begins: (dofs,).
+py::array_t<double> settled(const Solver& s, const Array& inputs, double t0) {
+  expect_size(inputs, s.scene->layout.total(), "inputs");
+  auto out = empty({static_cast<std::size_t>(s.scene->dofs())});
+  double* to = out.mutable_data();
+  Release release;
+  std::ranges::copy(settled_coordinates(*s.scene, settling_plan(*s.scene, s.plan.options), inputs.data(), t0), to);
+  return out;
+}
+
 // Which rows of the first substep say what others say already, in words; empty where there are none.
 std::string redundant(const Solver& s, const Array& inputs, double t0) {
   expect_size(inputs, s.scene->layout.total(), "inputs");
@@ -219,6 +230,7 @@ void bind_rollout(py::module_& m) {
       .def("simulate", &simulate, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
       .def("states", &states, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
       .def("force_balance", &force_balance, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
+      .def("settled", &settled, py::arg("inputs"), py::arg("t0"))
       .def("redundant", &redundant, py::arg("inputs"), py::arg("t0"))
       .def("simulate_batch", &simulate_batch, py::arg("inputs"), py::arg("steps"), py::arg("t0"),
            py::arg("lengths") = Lengths())

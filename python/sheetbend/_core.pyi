@@ -156,6 +156,7 @@ class Solver:
     def complex_step(self, inputs: ArrayLike, direction: ArrayLike, steps: Sequence[int], t0: float) -> Array: ...
     # per substep, per block: the force left at the start and after each Newton step, over the largest one
     def force_balance(self, inputs: ArrayLike, steps: int, t0: float) -> list[list[list[float]]]: ...
+    def settled(self, inputs: ArrayLike, t0: float) -> Array: ...  # (dofs,) where a start that settles begins
     def redundant(self, inputs: ArrayLike, t0: float) -> str: ...  # rows that others say already, in words
     # lengths: (batch,) frames of each scene, or none where all have every frame
     def simulate_batch(

@@ -21,7 +21,6 @@ from ..objects.markers import Place
 from ..objects.rod import Rod
 from ..objects.stiffness_field import laplacian_of_triangles, modes_of_laplacian, shares
 from ..recording.recording import Recording
-from ..scene.compiled import CompiledScene
 from ..scene.scene import Scene
 
 Array = np.ndarray
@@ -147,16 +146,14 @@ def _at(place: Place, field: Array) -> Array:
 def _shown(scene: Scene, places: Sequence[Place], r: Recording) -> tuple[Array, Array]:
     """(frames, markers, 3) m, how far markers are from where the scene starts, and (frames - 2, markers, 3) m/s, how
     much their velocities differ from those that it starts with; NaN where they are not seen."""
-    x, v = fields_at(scene.compiled, scene.compiled.inputs())
+    inputs, layout = scene.compiled.inputs(), scene.compiled.layout
+
+    def seen(array: str) -> Array:
+        first, count = layout[array]
+        return np.array([_at(place, inputs[first : first + count].reshape(-1, 3)) for place in places])
+
     rates = (r.positions[2:] - r.positions[:-2]) / (r.times[2:] - r.times[:-2])[:, None, None]
-    before = [np.array([_at(place, field) for place in places]) for field in (x, v)]
-    return np.asarray(r.positions - before[0]), np.asarray(rates - before[1])
-
-
-def fields_at(compiled: CompiledScene, inputs: Array) -> tuple[Array, Array]:
-    """(nodes, 3) m and m/s, places and velocities at the start."""
-    (x, count), (v, _) = compiled.layout["position"], compiled.layout["velocity"]
-    return inputs[x : x + count].reshape(-1, 3), inputs[v : v + count].reshape(-1, 3)
+    return np.asarray(r.positions - seen("position")), np.asarray(rates - seen("velocity"))
 
 
 def _likeliest(values: Array, at: Array, shown: Array, noise: float, extent: float) -> Array:

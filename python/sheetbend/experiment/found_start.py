@@ -7,13 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..motion.core_terms import divergence
 from ..motion.equilibrium import equilibrium
-from ..motion.simulate import simulate
-from .estimated_start import fields_at
 from .experiment import Experiment
 
 Array = np.ndarray
-SHORT, ITERATIONS = 1e-3, 10  # of a substep, and of Newton in it: as in settled.h
 
 
 def started(e: Experiment, numbers: Array) -> Experiment:
@@ -43,11 +41,6 @@ def start_nodes(e: Experiment, values: Mapping[str, float]) -> Array | None:
 
 def settled(e: Experiment, values: Mapping[str, float]) -> Array:
     """(nodes, 3) m, where the scene starts once rigid links hold, at values of its quantities."""
-    solver = replace(e.solver, h=SHORT * e.solver.h, iterations=max(ITERATIONS, e.solver.sweeps), extrapolate=1)
-    compiled = e.scene.compiled
-    inputs = compiled.inputs(compiled.values(values))
-    x, v = fields_at(compiled, inputs)
-    moved = np.array(simulate(e.scene, [solver.h], solver, values, x - solver.h * v).nodes[-1])
-    pinned = sorted(e.scene.pinned)
-    moved[pinned] = x[pinned]
-    return moved
+    compiled, solver = e.scene.compiled, replace(e.solver, extrapolate=1)
+    with divergence(e.scene):
+        return solver.core(compiled).settled(compiled.inputs(compiled.values(values)), 0.0).reshape(-1, 3)
