@@ -1,65 +1,16 @@
-// Distances of an unordered cloud of points, such as a depth camera's, from the cloth of a scene.
+// What an unordered cloud of points is compared with.
 //
-// A point of a cloud has no name: all that it says is how far the surface is from it. So it leaves one residual, its signed distance from the
-// closest point of the triangles. Which part of which triangle is closest is found by values. The distance from that part has a closed form over
-// any scalar, and its derivative is exact: the closest point moves within the surface, across which the distance is measured.
-//
-// Noise moves points over the border of a cloth as well, by about as much as it moves them off the cloth. There the distance is that from the plane
-// of the triangle, as if the cloth went on, so that noise does not pull at the border. Only what is farther over it than `overhang` counts on top.
+// Each shape has the residuals of one point (`rows`), and functions for the part of it that is closest to a point: closest_parts finds these by values,
+// corners_of gives a part's vertices, closest_place the place on it, and distances its residuals before they are divided by sigma.
 #pragma once
 
-#include <array>
-#include <vector>
+#include <variant>
 
-#include "core/contact/nearest.h"
+#include "adjoint/cloud_of_cloth.h"
+#include "adjoint/cloud_of_ropes.h"
 
 namespace sheetbend {
 
-inline constexpr double overhang = 3.0;  // of a point's sigma
-
-struct ClothSurface {
-  std::vector<int> vertices;                // first coordinate of each
-  std::vector<std::array<int, 3>> corners;  // of each triangle, which vertices
-  std::vector<std::array<bool, 6>>
-      borders;  // of each triangle, whether its edges (0 1), (1 2), (2 0) and its corners are at the border
-};
-
-// Throws std::invalid_argument where a triangle names no vertex.
-ClothSurface make_cloth_surface(std::vector<int> vertices, std::vector<std::array<int, 3>> corners);
-
-struct ClosestPart {
-  int triangle = -1;  // none for a point that is not seen
-  Part part;
-  bool at_border = false;
-};
-
-// Of each point (count, 3), NaN where it is not seen, for vertices at x (vertices, 3).
-std::vector<ClosestPart> closest_parts(const ClothSurface& s, const double* x, const double* points, std::size_t count);
-
-// Signed distance from the plane of a triangle; x: a point and the three corners.
-template <class T>
-T plane_distance(const T* x) {
-  const Vec3<T> a(x + 3), n = cross(Vec3<T>(x + 6) - a, Vec3<T>(x + 9) - a);
-  return dot(n, Vec3<T>(x) - a) / norm(n);
-}
-
-// Signed distance from the closest part of a triangle; x as above, sigma that of the point.
-template <class T>
-T surface_distance(const T* x, const ClosestPart& closest, double sigma) {
-  constexpr double negligible = 1e-4;  // of sigma: there a distance from an edge has no derivative
-  const T off = plane_distance(x);
-  if (closest.part.first < 0) return off;
-  const T squared = nearest_on_triangle(x, closest.part).squared;
-  const T side(value_of(off) < 0.0 ? -1.0 : 1.0);
-  if (!closest.at_border) {
-    const double least = negligible * sigma;
-    return value_of(squared) < least * least ? off : side * sqrt(squared);
-  }
-  const T over = squared - off * off;
-  const double free = overhang * sigma;
-  if (value_of(over) <= free * free) return off;
-  const T beyond = sqrt(over) - T(free);
-  return side * sqrt(off * off + beyond * beyond);
-}
+using CloudShape = std::variant<std::monostate, ClothSurface, RopeLines>;  // the first where there is no cloud
 
 }  // namespace sheetbend

@@ -20,12 +20,12 @@ namespace sheetbend {
 enum class Start : int { given, equilibrium, settled };  // where a motion starts
 enum class Loss : int { squares, soft_l1, huber, cauchy };
 
-// Either markers, or the points of a cloud: then there are no markers but a surface, and a column holds another point in every frame.
+// Either markers, or the points of a cloud: then there are no markers but a shape, and a column holds another point in every frame.
 struct Observations {
   std::vector<Marker> markers;
   std::size_t unplaced =
-      0;                 // points of a cloud: each has the inputs of an offset, as a marker has, and no use for them
-  ClothSurface surface;  // of a cloud
+      0;             // points of a cloud: each has the inputs of an offset, as a marker has, and no use for them
+  CloudShape shape;  // of a cloud
   std::vector<double> times;       // (frames) [s]
   std::vector<double> measured;    // (frames, columns, 3) [m], NaN = not seen; a column is a marker
   std::vector<double> sigma;       // (frames, columns) [m]: residuals are divided by it
@@ -33,9 +33,13 @@ struct Observations {
   Loss loss = Loss::squares;
   double loss_scale = 1.0;  // in units of sigma
 
-  bool is_cloud() const { return !surface.corners.empty(); }
+  bool is_cloud() const { return shape.index() != 0; }
   std::size_t columns() const { return times.empty() ? 0 : sigma.size() / times.size(); }
-  std::size_t rows_of_one() const { return is_cloud() ? 1 : axes.size(); }
+  std::size_t rows_of_one() const {
+    if (std::holds_alternative<ClothSurface>(shape)) return ClothSurface::rows;
+    if (std::holds_alternative<RopeLines>(shape)) return RopeLines::rows;
+    return axes.size();
+  }
 };
 
 // A further rollout of the same motion at a shorter substep, for extrapolation in time, and the weight of its markers.
@@ -72,8 +76,8 @@ struct Experiment {
     return scene->layout.total() + 3 * (observed.markers.size() + observed.unplaced);
   }
   std::size_t inputs() const { return time_offset_at() + 1 + ForceSensor::inputs * sensors.size(); }
-  std::size_t residual_count()
-      const;  // one per axis of every marker, or one per point of a cloud, and frame that was seen, then those of the sensors
+  // rows_of_one() per frame of every marker, or point of a cloud, that was seen, then those of the sensors
+  std::size_t residual_count() const;
   std::size_t readings() const;  // six per sample of every sensor
   int steps() const { return steps(plan); }
   int steps(const Plan& run) const;  // substeps until the last frame and sample

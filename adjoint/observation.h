@@ -38,28 +38,34 @@ T* marker_residuals(const Observations& o, std::size_t at, const Vec3<T>& p, T* 
   return r;
 }
 
-// The same of a cloud, whose residuals are the points' distances from the surface; its simulated points are the closest ones on it.
-template <class T>
-T* cloud_residuals(const Observations& o, std::size_t frame, const T* x, T* r, T* simulated) {
-  const ClothSurface& s = o.surface;
+// The same of a cloud, whose residuals are the points' distances from the shape; its simulated points are the closest ones on it.
+template <class T, class Shape>
+T* cloud_residuals(const Observations& o, const Shape& s, std::size_t frame, const T* x, T* r, T* simulated) {
   std::vector<double> values;
   for (const int dof : s.vertices)
     for (int d = 0; d < 3; ++d) values.push_back(value_of(x[dof + d]));
   const std::size_t count = o.columns(), first = frame * count;
-  const std::vector<ClosestPart> parts = closest_parts(s, values.data(), &o.measured[3 * first], count);
+  const auto parts = closest_parts(s, values.data(), &o.measured[3 * first], count);
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t at = first + i;
     T own[12];
     for (int d = 0; d < 3; ++d) own[d] = T(o.measured[3 * at + d]);
-    if (parts[i].triangle < 0) {
+    if (parts[i].is_none()) {
       if (simulated) Vec3<T>(own).store(simulated + 3 * at);
       continue;
     }
-    for (int k = 0; k < 3; ++k) Vec3<T>(x + s.vertices[s.corners[parts[i].triangle][k]]).store(own + 3 * (k + 1));
-    if (simulated) (Vec3<T>(own) - nearest_on_triangle(own, parts[i].part).apart).store(simulated + 3 * at);
+    T* corner = own;
+    for (const int vertex : corners_of(s, parts[i])) Vec3<T>(x + s.vertices[vertex]).store(corner += 3);
+    if (simulated) closest_place(own, parts[i]).store(simulated + 3 * at);
     if (!r) continue;
-    const T d = T(1.0 / o.sigma[at]) * surface_distance(own, parts[i], o.sigma[at]);
-    *r++ = robust_scale(o, d * d) * d;
+    auto off = distances(own, parts[i], o.sigma[at]);
+    T squared(0.0);
+    for (T& d : off) {
+      d = T(1.0 / o.sigma[at]) * d;
+      squared += d * d;
+    }
+    const T scale = robust_scale(o, squared);
+    for (const T& d : off) *r++ = scale * d;
   }
   return r;
 }
@@ -67,7 +73,9 @@ T* cloud_residuals(const Observations& o, std::size_t frame, const T* x, T* r, T
 // Residuals of one frame (not where r is null), and simulated markers (likewise), from the coordinates x at its time.
 template <class T>
 T* frame_residuals(const Observations& o, std::size_t frame, const T* x, const T* offsets, T* r, T* simulated) {
-  if (o.is_cloud()) return cloud_residuals(o, frame, x, r, simulated);
+  if (const auto* cloth = std::get_if<ClothSurface>(&o.shape))
+    return cloud_residuals(o, *cloth, frame, x, r, simulated);
+  if (const auto* ropes = std::get_if<RopeLines>(&o.shape)) return cloud_residuals(o, *ropes, frame, x, r, simulated);
   const std::size_t count = o.markers.size();
   for (std::size_t m = 0; m < count; ++m) {
     const std::size_t at = frame * count + m;

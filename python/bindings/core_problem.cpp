@@ -38,11 +38,14 @@ Observations make_observations(const py::dict& d) {
     throw std::invalid_argument("loss: got '" + loss + "'. Fix: use 'squares', 'soft_l1', 'huber' or 'cauchy'");
   o.loss = losses.at(loss);
   o.loss_scale = get<double>(d, "loss_scale");
-  if (!d["surface"].is_none()) {
-    const auto surface = get<py::dict>(d, "surface");
-    o.unplaced = get<std::size_t>(surface, "points");
-    o.surface = make_cloth_surface(get<std::vector<int>>(surface, "vertices"),
-                                   get<std::vector<std::array<int, 3>>>(surface, "triangles"));
+  if (!d["cloud"].is_none()) {
+    const auto cloud = get<py::dict>(d, "cloud");
+    o.unplaced = get<std::size_t>(cloud, "points");
+    auto vertices = get<std::vector<int>>(cloud, "vertices");
+    if (cloud.contains("triangles"))
+      o.shape = make_cloth_surface(std::move(vertices), get<std::vector<std::array<int, 3>>>(cloud, "triangles"));
+    else
+      o.shape = make_rope_lines(std::move(vertices), get<std::vector<std::array<int, 2>>>(cloud, "links"));
   }
   for (const py::handle item : d["markers"]) {
     const auto m = item.cast<py::dict>();

@@ -139,9 +139,6 @@ def test_what_follows_markers_is_refused() -> None:
 
 
 def test_fields_that_need_markers_are_refused() -> None:
-    rope = sb.rope(0.3, 4, density=0.05, EI=1e-3, clamp_start=(1, 0, 0))
-    with pytest.raises(sb.InputError, match="is a cloud, and the scene has no cloth"):
-        sb.Experiment(scene=rope, recording=cloud())
     refused: list[dict[str, Any]] = [
         {"markers": [sb.on_particle(0)]},
         {"offsets": {"m0": ("cloth_warp", None, None)}},

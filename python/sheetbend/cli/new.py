@@ -32,8 +32,8 @@ from .spelling import options
 from .targets import check_targets
 
 CLOUD = (
-    "write a configuration by hand: what holds the cloth from a recording of markers or a robot's poses in `file` and "
-    "[[scene.tool]], and the points as `cloud` in [[recording]] (docs/recordings.md, Point clouds)"
+    "write a configuration by hand: what holds the cloth or the rope from a recording of markers or a robot's poses in "
+    "`file` and [[scene.tool]], and the points as `cloud` in [[recording]] (docs/recordings.md, Point clouds)"
 )
 ELSEWHERE = {
     "counts": ("a point cloud", CLOUD),

@@ -99,8 +99,8 @@ class RecordingSection(Section):
     file: str = key(..., "NPZ, CSV or PKL, relative to the configuration")
     cloud: str | None = key(
         None,
-        "an NPZ of a point cloud that is compared with the scene's cloths, in place of the markers of `file`: these "
-        "drive and hold the scene. Where no marker does, `file` names the cloud too",
+        "an NPZ of a point cloud that is compared with the scene's cloths or ropes, in place of the markers of `file`: "
+        "these drive and hold the scene. Where no marker does, `file` names the cloud too",
     )
     name: Name | None = key(None, "the file's when left out")
     units: Literal["m", "cm", "mm"] | None = key(None, "length unit of the file; its JSON's when left out")

@@ -78,7 +78,7 @@ def far_off(e: Experiment, residuals: Array) -> list[str]:
     return [
         f"{e.name}: the points of the cloud lie {short(1e3 * left * e.sigma, 2)} mm rms off the fitted motion, "
         f"{short(left, 2)} times their sigma, and the intervals take that for noise. Check sigma, gravity, lengths, "
-        "densities, clamps and clocks, and whether points of other things than the cloth were cut off"
+        "densities, clamps and clocks, and whether points of other things were cut off"
     ]
 
 

@@ -22,7 +22,7 @@ from .correction import Correction, recorded_noise
 from .estimated_start import EstimatedStart, together
 from .force_sensor import INPUTS, ForceSensor
 from .names import check_names
-from .of_cloud import check_cloud, surface_of
+from .of_cloud import check_cloud, rows_of_point, shape_of
 from .shooting import Shooting
 
 NO_SHARE = 1e-9  # interpolation weights below this are zero
@@ -34,7 +34,8 @@ class Experiment:
 
     Attributes:
         scene: frozen by the fit.
-        recording: of markers, or a `Cloud` of points on the scene's cloths; times may start anywhere, see `start_time`.
+        recording: of markers, or a `Cloud` of points on the scene's cloths or ropes; times may start anywhere, see
+            `start_time`.
         name: the recording's by default.
         markers: places of the markers (see `places_for`).
         fit: (start, stop) in s of the recording's own time, the part that the fit sees; all of it by default.
@@ -141,13 +142,14 @@ class Experiment:
 
     @property
     def is_cloud(self) -> bool:
-        """Whether the recording is a cloud, whose points are compared with the closest points of the scene's cloths."""
+        """Whether the recording is a cloud, whose points are compared with the closest places on the scene's cloths,
+        or on its ropes if it has no cloth."""
         return isinstance(self.recording, Cloud)
 
     @property
     def rows_each(self) -> int:
-        """Residuals of a marker in a frame, one along every axis that counts; of a point of a cloud its distance."""
-        return 1 if self.is_cloud else len(self.axes)
+        """Residuals of a marker in a frame, one along every axis that counts; of a point of a cloud its distances."""
+        return rows_of_point(self.scene) if self.is_cloud else len(self.axes)
 
     @cached_property
     def places(self) -> tuple[Place | None, ...]:
@@ -249,7 +251,7 @@ class Experiment:
             "loss": self.loss,
             "loss_scale": self.loss_scale,
             "markers": [place.core(self.scene) for place in self.compared_places],
-            "surface": surface_of(self.scene, len(self.compared)) if self.is_cloud else None,
+            "cloud": shape_of(self.scene, len(self.compared)) if self.is_cloud else None,
         }
 
     def extra_terms(self) -> list[Term]:

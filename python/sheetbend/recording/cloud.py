@@ -1,4 +1,4 @@
-"""A cloud: points on a surface over time, such as a depth camera's, of which nobody knows which is which."""
+"""A cloud: points on a cloth or a rope over time, such as a depth camera's, of which nobody knows which is which."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ CHUNK = 256  # points whose distances from all others are held at once
 
 @dataclass(frozen=True, eq=False)
 class Cloud(Recording):
-    """Unordered points on the surface of a cloth, another number of them in every frame; some or many may be missing.
+    """Unordered points on a cloth or a rope, another number of them in every frame; some or many may be missing.
 
-    A fit compares each point with the closest point of the simulated cloth: see "Point clouds" in docs/recordings.md.
+    A fit compares each point with the closest place on the simulated cloth or rope: see "Point clouds" in
+    docs/recordings.md.
     Make one with `Cloud.of` or `Cloud.load`. It is a `Recording` whose points have no names: row k of one frame is
     another point than row k of the next, so whatever follows a marker over time (`select`, `resample`, `filled`,
     `noise`) is refused.
@@ -129,6 +130,31 @@ class Cloud(Recording):
         frames = [self.frame(k) for k in range(len(self.times))]
         drawn = [np.sort(generator.permutation(len(x))[:most]) for x in frames]
         return self._with([x[own] for x, own in zip(frames, drawn, strict=True)], self.times)
+
+    def to_axis(self, camera: ArrayLike, radius: float) -> Cloud:
+        """The cloud of a thick rope, moved from the side that a camera sees to the rope's axis.
+
+        Each point moves away from the camera by pi/4 of the radius, which is the mean depth of the axis below the half
+        of a cylinder that faces the camera. Across the rope the points still scatter, by half of the radius: let
+        `sigma` contain this scatter.
+
+        Args:
+            camera: (3,) m, where the camera is, in the recording's frame.
+            radius: of the rope, m.
+
+        Raises:
+            RecordingError: the camera is no place, or the radius is not positive.
+        """
+        at = np.asarray(camera, dtype=float)
+        if at.shape != (3,) or not np.isfinite(at).all():
+            raise RecordingError("camera", "must be a place", camera, "give x, y and z of the camera in m")
+        if not (np.isfinite(radius) and radius > 0):
+            raise RecordingError("radius", "must be positive", radius, "give the rope's radius in m, such as 0.004")
+        frames = [self.frame(k) for k in range(len(self.times))]
+        away = [x - at for x in frames]
+        depth = np.pi / 4 * radius
+        moved = [x + depth * d / np.linalg.norm(d, axis=1, keepdims=True) for x, d in zip(frames, away, strict=True)]
+        return self._with(moved, self.times)
 
     def summary(self) -> str:
         """A few lines for a terminal: size, duration, attribution."""

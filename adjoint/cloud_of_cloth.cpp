@@ -1,4 +1,4 @@
-#include "adjoint/cloud.h"
+#include "adjoint/cloud_of_cloth.h"
 
 #include <algorithm>
 #include <cmath>
