@@ -609,3 +609,20 @@ def test_document_holds_every_key() -> None:
     assert text == renewed(text), "run: python -m sheetbend.config.reference docs/configuration.md"
     fabric = (ROOT / "docs" / "fabric.md").read_text()
     assert fabric == renewed(fabric, fabric_tables()), "run: python -m sheetbend.config.reference docs/fabric.md"
+
+
+@pytest.mark.parametrize(
+    ("line", "fix"),
+    [
+        ("EI = 1,3", "write a point as decimal mark"),
+        ("name = twin", "put text in quotes"),
+        ("length = 60 cm", "without its unit"),
+        ("length 0.6", "write key = value"),
+        ('name = "twin', "correct that line"),
+    ],
+)
+def test_a_line_that_is_no_toml_is_shown_with_its_cure(tmp_path: Path, line: str, fix: str) -> None:
+    (tmp_path / "slip.toml").write_text(f"[experiment]\n{line}\n")
+    with pytest.raises(sb.ConfigError, match=fix) as refused:
+        parse(tmp_path / "slip.toml")
+    assert refused.value.got == line

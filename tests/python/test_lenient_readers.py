@@ -217,3 +217,24 @@ def test_a_cell_of_many_digits_is_refused_at_once(tmp_path: Path) -> None:
     (tmp_path / "take.csv").write_text("%time\ta.x\ta.y\ta.z\n1\t1\t2\t3\n" + "1" * 130_000 + "\n")
     with pytest.raises(RecordingError, match="must have 4 cells"):
         Recording.load(tmp_path / "take.csv")
+
+
+def test_cells_that_say_that_a_marker_is_not_seen(tmp_path: Path) -> None:
+    cells = ["NA,NA,NA", "n/a,N/A,null", "None,none,NULL", "1,2,3"]
+    text = "time,a_x,a_y,a_z\n" + "".join(f"{t},{row}\n" for t, row in zip(TIMES, cells, strict=True))
+    (tmp_path / "take.csv").write_text(text)
+    assert Recording.load(tmp_path / "take.csv").mask[:, 0].tolist() == [False, False, False, True]
+
+
+def test_seconds_under_the_name_of_nanoseconds_are_refused(tmp_path: Path) -> None:
+    """`%time` in seconds made a recording at 1e11 Hz, and `sheetbend new` asked for 126 GB."""
+    stamps = "".join(f"{1700000000 + k / 100:.2f},{k},2,3\n" for k in range(12))
+    (tmp_path / "bag.csv").write_text("%time,a.x,a.y,a.z\n" + stamps)
+    with pytest.raises(RecordingError, match=r"line 3: has a time in ns, 1e-11 s after.*name the column"):
+        Recording.load(tmp_path / "bag.csv")
+
+
+def test_a_table_of_two_coordinates_is_told_what_it_lacks(tmp_path: Path) -> None:
+    (tmp_path / "flat.csv").write_text("t,a_x,a_y,b_x,b_y\n0,1,2,3,4\n")
+    with pytest.raises(RecordingError, match=r"only x and y of a marker.*a third column"):
+        Recording.load(tmp_path / "flat.csv")

@@ -36,3 +36,11 @@ def test_the_rate_of_rounded_times() -> None:
     """Times of four digits at 120 Hz are 0.0083 s apart in the median, which was called 120.5 Hz."""
     found = draft([Take(seen(hanging(False)), "take.csv")], "take")
     assert any("at 120 Hz" in sentence for sentence in found.seen)
+
+
+def test_milliseconds_that_pass_for_seconds_are_refused() -> None:
+    """A swinging rope was drafted as 1000 times slower than it is."""
+    fast = hanging(False)
+    slow = sb.Recording(fast.positions, 1000 * fast.times, name="take")
+    with pytest.raises(sb.RecordingError, match=r"8.3 s apart.*time_ms"):
+        seen(slow)

@@ -22,8 +22,10 @@ from sheetbend.mesh import grid
 from sheetbend.objects.arm import add_pendulum
 from sheetbend.page import Shown, fit_page, motion_page, of_recording, of_trajectory
 from sheetbend.page.packed import MISSING, packed_motions
+from sheetbend.page.render import table
 from sheetbend.report.fit_result import FitResult
 from sheetbend.report.report import sections
+from sheetbend.report.tables import Section
 from sheetbend.result.estimate import Correlation
 from typer.testing import CliRunner
 
@@ -66,6 +68,17 @@ def test_the_page_draws_the_cost_along_each_parameter(fitted: sb.Fit) -> None:
         if kind == "curve":
             assert places[[0, -1], 1] == pytest.approx(90 * 0.3 / 1.3, abs=0.06)
             assert places[:, 1].max() == 90.0
+    assert "<figcaption>rope_EI [N m²]</figcaption>" in page
+    for ends in re.findall(r'<div class="ends"><span>(.*?)</span><span>(.*?)</span><span>(.*?)</span>', page):
+        first, middle, last = map(float, ends)  # which were alike where the interval is narrow
+        assert first < middle < last
+
+
+def test_tables_have_no_empty_columns_and_raised_powers() -> None:
+    section = Section("t", ("given", "value", "unit"), (("a", "", "N m^2"), ("b", "", "kg")), (("gauge", "x^0.5 y^2"),))
+    shown = table(section)
+    assert shown["headers"] == ["given", "unit"] and shown["rows"] == [["a", "N m²"], ["b", "kg"]]
+    assert shown["left"] == [True, True] and shown["notes"] == [("gauge", "x^0.5 y²")]
 
 
 def data_of(page: str) -> dict[str, Any]:
@@ -269,6 +282,8 @@ def test_a_browser_draws_it_without_a_network(fitted: sb.Fit, tmp_path: Path) ->
     assert "<title>swing \u2713</title>" in page  # set when all is drawn
     assert re.search(r'<div id="space">\s*<canvas', page) and "0.200 s" in page
     assert page.count('class="uplot') >= 4
+    assert "A cell of the floor is 10 cm." in page and "rows from m0 to" in page
+    assert re.search(r'<ul id="pairs"[^>]*><li>rope_EI</li><li>rope_bend_damping</li>', page)
     assert '<span id="controls">' in page and "<h2>Motion</h2>" in page
 
 

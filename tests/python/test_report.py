@@ -20,9 +20,10 @@ from sheetbend.optional import MissingExtraError, require
 from sheetbend.quantities.wording import short
 from sheetbend.report.fit_result import FitResult
 from sheetbend.report.report import figures, plain, rich_report
-from sheetbend.result.estimate import Correlation, Estimate, Given
+from sheetbend.report.report_premises import _moved
+from sheetbend.result.estimate import Correlation, Estimate, Given, Premise
 from sheetbend.result.motions import RecordingFit
-from sheetbend.result.result import Start
+from sheetbend.result.result import Misfit, Start
 
 GAUGE = "rope_density^+1 * rope_EA^+1 stays free: only the ratio rope_EA/rope_density is known"
 
@@ -305,3 +306,31 @@ class TestAxesOfOthers:
             plot.estimates(two, ax=given)
         with pytest.raises(InputError, match="must be axes"):
             plot.estimates(two, ax=[figure, 3])
+
+
+def test_a_sigma_in_millimeters_is_named(result: FitResult) -> None:
+    """0.5 in place of 5e-4 passed without a word."""
+    misfit = Misfit(reduced_chi_square=4e-6, smallest_sigma=0.5, largest_sigma=0.5, model_error=0.0)
+    assert "sigma: is 500 times the residuals. It is a length in m" in plain(dataclasses.replace(result, misfit=misfit))
+    right = dataclasses.replace(misfit, reduced_chi_square=0.07)
+    assert "times the residuals" not in plain(dataclasses.replace(result, misfit=right))
+
+
+def test_large_percentages_have_no_exponent() -> None:
+    e = estimate("drag", 0.03, 0.02, "weak", "")
+    moved = Premise(name="table about x", value=None, unit="", off_by=1.0, words="1 degree", moved={"drag": -0.096})
+    assert _moved(moved, e) == "-320 %"
+    assert _moved(dataclasses.replace(moved, moved={"drag": 0.0031}), e) == "+10 %"
+
+
+def test_panels_over_one_time_begin_at_one_place() -> None:
+    """The last one, whose strip has wider numbers, began farther right, and "held out" stood on a curve."""
+    times = np.linspace(0.0, 1.0, 20)
+    x = np.random.default_rng(0).normal(size=(20, 3, 3))
+    panels = plot.trajectories(x, x + 1e-6, times, markers=("a", "b", "c"), held_out=(0.5, 1.0))
+    figure = panels[0].figure
+    figure.canvas.draw()
+    assert len(panels) == 3 and len(figure.axes) == 4
+    assert len({round(panel.get_position().x0, 6) for panel in figure.axes}) == 1
+    words = [area.get_text() for area in figure.findobj(lambda part: hasattr(part, "get_text"))]
+    assert "shaded: held out" in words and "held out" not in words

@@ -22,6 +22,7 @@ from .schema import Config
 
 LARGEST = 2**22
 """Bytes of a configuration."""
+LONGEST_LINE = 200  # characters of a line in which slips are looked for
 _PART = r"(?:[A-Za-z0-9_-]++|\"[^\"\n]*+\"|'[^'\n]*+')"
 _MANY_PARTS = re.compile(rf"(?<![A-Za-z0-9_-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{50}}")
 
@@ -89,10 +90,31 @@ def content(path: Path) -> dict[str, Any]:
     except UnicodeError:
         raise
     except ValueError as error:  # tomllib's own is one, and so is that of a number of too many digits
-        raise ConfigError(str(path), f"is no valid TOML: {error}", path.name, "correct that line") from error
+        line = _line_of(text, str(error))
+        raise ConfigError(str(path), f"is no valid TOML: {error}", line or path.name, _mended(line)) from error
     check_depth(path, found, ConfigError)
     _check_texts(found)
     return found
+
+
+def _line_of(text: str, problem: str) -> str:
+    """The line that a problem of the parser names, at most `LONGEST_LINE` of it; "" where it names none."""
+    told = re.search(r"at line (\d+)", problem)
+    lines = text.split("\n")
+    return lines[int(told[1]) - 1].strip()[:LONGEST_LINE] if told and int(told[1]) <= len(lines) else ""
+
+
+def _mended(line: str) -> str:
+    """How to mend a line that is no TOML, for the slips that people make."""
+    if re.match(r"[\w.-]+\s*=\s*[-+]?\d+,\d", line):
+        return "write a point as decimal mark, or a list in [brackets]"
+    if re.match(r"[\w.-]+\s*=\s*[A-Za-z]", line):
+        return "write true or false, or put text in quotes"
+    if re.match(r"[\w.-]+\s*=\s*[-+.\deE]+\s*[A-Za-z%]", line):
+        return "write the number without its unit"
+    if line and "=" not in line and not line.startswith("["):
+        return "write key = value"
+    return "correct that line"
 
 
 def _check_texts(found: Any, key: str = "") -> None:

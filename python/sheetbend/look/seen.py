@@ -21,6 +21,7 @@ SILENT = 2e-3  # of the extent: how little a marker moves that stays, where no n
 RIGID = 1.8  # times the noise, the standard deviation of the distance of two markers of one body: sqrt(2) is expected
 MANY, ABOVE = 50, 2.9  # frames from which on 98 % of the distances are 2.05 sqrt(2) times the noise above the true one
 SHARE, FEW = 0.98, 10  # of the frames have smaller distances; frames from which on noise is taken out of these
+SLOWEST = 0.5  # s between two frames of a motion
 REST = 0.15  # s that a recording must begin at rest to be called so
 RARE = 0.1  # of the frames in which the best one is seen: a marker seen in fewer is a reflection, or a stray
 NEAR = 1.9  # times the nearest neighbor's distance: markers of a sheet have more than two others so near
@@ -105,6 +106,7 @@ def seen(recording: Recording, up: str | None = None) -> Seen:
     moved = np.sqrt(np.nanmean(np.sum((x - center) ** 2, axis=2), axis=0)) if len(t) > 1 else np.zeros(count)
     still = moved <= max(STILL * noise, SILENT * extent)
     _check_together(recording)
+    _check_rate(recording)
     distance = _distances(x)
     apart = np.nanquantile(distance, SHARE, axis=0)
     if len(t) >= FEW:
@@ -128,6 +130,16 @@ def seen(recording: Recording, up: str | None = None) -> Seen:
         sheet=_is_sheet(x, apart, in_bodies),
         rare=rare,
     )
+
+
+def _check_rate(recording: Recording) -> None:
+    """Refuse motions so slowly recorded that their times are in another unit."""
+    if len(recording.times) < FEW:
+        return
+    apart = float(np.median(np.diff(recording.times)))
+    if apart >= SLOWEST:
+        fix = "name its column time_ms if it counts milliseconds, or take every frame of the recording"
+        raise RecordingError(f"{recording.name}.times", f"are {apart:.3g} s apart, too far for a motion", apart, fix)
 
 
 def _check_together(recording: Recording) -> None:

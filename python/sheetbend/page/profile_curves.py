@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..quantities.wording import short
+from ..quantities.wording import figures, raised
 from ..result.estimate import ProfileCurve
 from ..result.result import FitData
 
@@ -18,7 +18,7 @@ class ProfilePicture:
     """One small picture: points of lines as SVG writes them, in a box of WIDTH and HEIGHT, and what is written below.
 
     Attributes:
-        name: of the parameter.
+        name: of the parameter, and its unit.
         curve, parabola: lines.
         end: height of the dotted line where intervals end.
         estimate: place of the estimate along the box.
@@ -46,20 +46,21 @@ def _picture(curve: ProfileCurve, unit: str) -> ProfilePicture:
     first, last = curve.values[0], curve.values[-1]
     middle = curve.values[curve.rises.index(0.0)]
     scale = WIDTH / (last - first)
+    written = figures([middle, first, last], (last - first) / 2)
 
     def line(rises: tuple[float, ...]) -> str:
         places = zip(curve.values, rises, strict=True)
         return " ".join(f"{scale * (x - first):.1f},{_down(rise):.1f}" for x, rise in places)
 
     return ProfilePicture(
-        name=curve.name,
+        name=f"{curve.name} [{raised(unit)}]" if unit else curve.name,
         curve=line(curve.rises),
         parabola=line(curve.parabola),
         end=round(_down(1.0), 1),
         estimate=round(scale * (middle - first), 1),
-        first=short(first),
-        middle=f"{short(middle)} {unit}".rstrip(),
-        last=short(last),
+        first=written[1],
+        middle=written[0],
+        last=written[2],
     )
 
 

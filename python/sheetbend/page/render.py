@@ -9,6 +9,7 @@ from importlib.resources import files
 from typing import Any
 
 from ..optional import require
+from ..quantities.wording import raised
 from ..report.tables import Section, flush_left
 
 _PARTS = files(__package__)
@@ -40,13 +41,15 @@ def compressed(text: str) -> str:
 
 
 def table(section: Section) -> dict[str, Any]:
-    """A report's section as the templates want it."""
+    """A report's section as the templates want it, without columns that are empty, and with raised powers."""
+    columns = [k for k in range(len(section.headers)) if k == 0 or any(row[k] for row in section.rows)]
+    left = flush_left(section)
     return {
         "title": section.title,
-        "headers": section.headers,
-        "rows": section.rows,
-        "left": flush_left(section),
-        "notes": section.notes,
+        "headers": [section.headers[k] for k in columns],
+        "rows": [[raised(row[k]) for k in columns] for row in section.rows],
+        "left": [left[k] for k in columns],
+        "notes": [(label, raised(sentence)) for label, sentence in section.notes],
     }
 
 

@@ -68,14 +68,19 @@ def strip(panel: Axes, label: str, *, share: float = 0.25) -> Axes:
         box = panel.get_position()
         panel.set_position((box.x0, box.y0 + 1.2 * share * box.height, box.width, (1.0 - 1.2 * share) * box.height))
         below = figure.add_axes((box.x0, box.y0, box.width, share * box.height), sharex=panel)
-    clean(below)
     panel.tick_params(labelbottom=False, bottom=False)
     panel.set_xlabel("")
     panel.spines["bottom"].set_visible(False)
-    below.axhline(0.0, color=GRAY, linewidth=0.6, zorder=0)
-    below.set_ylabel(label)
-    below.locator_params(axis="y", nbins=3)
-    return below
+    return as_strip(below, label)
+
+
+def as_strip(panel: Axes, label: str) -> Axes:
+    """A panel made ready for residuals, with a line at zero."""
+    clean(panel)
+    panel.axhline(0.0, color=GRAY, linewidth=0.6, zorder=0)
+    panel.set_ylabel(label)
+    panel.locator_params(axis="y", nbins=3)
+    return panel
 
 
 def panels_in(

@@ -193,7 +193,7 @@ def box_in_space(panel: Any, points: Array, gravity: ArrayLike) -> None:
     panel.view_init(elev=18, azim=-58, vertical_axis="xyz"[upright])
     panel.set_box_aspect(size, zoom=0.9)
     for axis, name in enumerate("xyz"):
-        panel.locator_params(axis=name, nbins=1 + round(3 * size[axis] / size.max()))
+        panel.locator_params(axis=name, nbins=1 + round(2 * size[axis] / size.max()))
     panel.grid(visible=False)
 
 

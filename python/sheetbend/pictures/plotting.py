@@ -17,7 +17,7 @@ from ..arrays.timeseries import Array
 from ..doubts.prediction import Comparison
 from ..errors import InputError
 from ..files.whole import written
-from .drawing import ACCENT, GRAY, INK, PALE, WARM, clean, key, panels_in, seen_points, strip
+from .drawing import ACCENT, GRAY, INK, PALE, WARM, as_strip, clean, key, panels_in, seen_points, strip
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -88,8 +88,11 @@ def plot_trajectories(
     names = list(markers) or [f"m{index}" for index in range(measured.shape[1])]
     shown = np.unique(np.linspace(0, measured.shape[1] - 1, min(_MOST_PANELS, measured.shape[1])).astype(int))
     axis = _liveliest(measured) if axis is None else axis
-    heights = [1.0] * (len(shown) - 1) + [1.7]  # the last one has the strip
-    panels, _ = panels_in(ax, len(shown), (7.2, 1.8 + 1.15 * len(shown)), title, sharex=True, height_ratios=heights)
+    alone = ax is None  # then the strip has a row of its own, so that all of them begin at one place
+    heights = [1.0] * len(shown) + [0.7] * alone
+    size = (7.2, 1.8 + 1.15 * len(shown))
+    panels, _ = panels_in(ax, len(shown) + alone, size, title, sharex=True, height_ratios=heights)
+    below = as_strip(panels.pop(), "off [mm]") if alone else strip(panels[-1], "off [mm]", share=0.4)
     for panel, marker in zip(panels, shown, strict=True):
         clean(panel)
         panel.plot(times, 1e3 * measured[:, marker, axis], ".", color=GRAY, markersize=3.6, markeredgewidth=0)
@@ -99,12 +102,10 @@ def plot_trajectories(
         panel.margins(x=0)
         panel.text(1.01, 0.5, names[marker], transform=panel.transAxes, va="center", color=INK)
         _shade(panel, held_out)
-    _name_shade(panels[0], held_out)
     without = [("without physics", WARM)] if baseline is not None else []
-    key(panels[0], [("measured", GRAY), ("simulated", ACCENT), *without])
+    key(panels[0], [("measured", GRAY), ("simulated", ACCENT), *without, *_shaded(held_out)])
     panels[len(panels) // 2].set_ylabel(f"{_AXES[axis]} [mm]")
     off = 1e3 * (simulated - measured)[:, shown, axis]
-    below = strip(panels[-1], "off [mm]", share=0.4)
     below.plot(times, off, color=GRAY, linewidth=0.5)
     below.plot(times, off[:, int(np.nansum(off**2, axis=0).argmax())], color=WARM, linewidth=0.8)
     _shade(below, held_out)
@@ -156,8 +157,8 @@ def plot_motions(
         for part in (panel, below):
             _shade(part, motion.held_out)
     below.set_xlabel("time [s]")
-    shaded = [("shaded: held out", INK)] if any(motion.held_out for motion in motions) else []
-    key(whole, [("measured", GRAY), ("simulated", ACCENT), *shaded])
+    spans = (motion.held_out for motion in motions if motion.held_out)
+    key(whole, [("measured", GRAY), ("simulated", ACCENT), *_shaded(next(spans, None))])
     return np.array(panels)
 
 
@@ -255,12 +256,19 @@ def plot_residuals(
     panel.plot(times, gap[:, worst], color=WARM, linewidth=0.9)
     panel.plot(times, mean, color=ACCENT, linewidth=1.8)
     _shade(panel, held_out)
-    _name_shade(panel, held_out)
     panel.set_ylim(bottom=0)
     panel.margins(x=0)
     panel.set_xlabel("time [s]")
     panel.set_ylabel("distance [mm]")
-    key(panel, [("each marker", GRAY), (f"worst marker: {names[worst]}", WARM), ("all markers, rms", ACCENT)])
+    key(
+        panel,
+        [
+            ("each marker", GRAY),
+            (f"worst marker: {names[worst]}", WARM),
+            ("all markers, rms", ACCENT),
+            *_shaded(held_out),
+        ],
+    )
     return panel
 
 
@@ -269,11 +277,9 @@ def _shade(panel: Axes, span: tuple[float, float] | None) -> None:
         panel.axvspan(*span, color=PALE, zorder=0, linewidth=0)
 
 
-def _name_shade(panel: Axes, span: tuple[float, float] | None) -> None:
-    if span is not None:
-        place = ("data", "axes fraction")
-        style: dict[str, Any] = {"va": "top", "fontsize": 8, "color": GRAY}  # inside: above stands the key
-        panel.annotate("held out", (span[0], 1), (3, -3), xycoords=place, textcoords="offset points", **style)
+def _shaded(span: tuple[float, float] | None) -> list[tuple[str, str]]:
+    """What the key says of a shaded part."""
+    return [] if span is None else [("shaded: held out", INK)]
 
 
 def _liveliest(measured: Array) -> int:

@@ -38,8 +38,8 @@ def figures(numbers: Sequence[float | None], uncertainty: float | None) -> list[
 
 
 def raised(unit: str) -> str:
-    """A unit with its powers as superscripts, for figures: N m^2 as N m²."""
-    return re.sub(r"\^(-?[0-9]+)", lambda power: power[1].translate(_RAISED), unit)
+    """A text with whole powers as superscripts, for figures and pages: N m^2 as N m². Others stay: x^0.5."""
+    return re.sub(r"\^(-?[0-9]+)(?![0-9.]*[0-9])", lambda power: power[1].translate(_RAISED), unit)
 
 
 def quantity(value: float, parameter: Parameter) -> str:

@@ -36,6 +36,7 @@ GROWTH_SHOWN = 10.0
 IN_ALL = "+/- in all"  # heading of the half-width with errors of given values
 FELT = 1.1  # half-widths: where errors of given values make them no wider, the report leaves them out
 _SHAKEN = 0.1  # of a half-width: less adds next to nothing to it
+FAR_BELOW = 0.02  # of sigma: residuals so small tell of a sigma in another unit
 
 
 def sections(result: FitData) -> list[Section]:
@@ -116,10 +117,14 @@ def _misfit(result: FitData) -> Section:
     told = [short(1e3 * sigma) for sigma in (m.smallest_sigma, m.largest_sigma)]
     sigma = f"{told[0]} mm" if told[0] == told[1] else f"{told[0]} to {told[1]} mm"
     beyond = f"{short(1e3 * m.model_error)} mm in each coordinate" if m.model_error > 0 else "residuals are below sigma"
-    notes = (
+    notes: tuple[tuple[str, str], ...] = (
         ("reduced chi-square", f"{short(m.reduced_chi_square)}, against the given sigma of {sigma}"),
         ("model error beyond sigma", beyond),
     )
+    if 0 < m.reduced_chi_square < FAR_BELOW**2:
+        times = short(m.reduced_chi_square**-0.5, 2)
+        said = f"is {times} times the residuals. It is a length in m; priors count too much beside so large a one"
+        notes += (("sigma", said),)
     return Section("Misfit", notes=notes)
 
 

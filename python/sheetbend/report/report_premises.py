@@ -56,10 +56,10 @@ def _moved(premise: Premise, e: Estimate) -> str:
         return ""
     if abs(moved) < 1e-3 * (e.half_width or 0.0):
         return "0"
-    sign = "" if premise.name == "markers" else "+"
+    sign = "+" if moved > 0 and premise.name != "markers" else ""
     if e.half_width is not None and abs(e.value) > e.half_width:
-        return f"{100 * moved / abs(e.value):{sign}.2g} %"
-    return f"{moved:{sign}.2g} {e.unit}".rstrip()
+        return f"{sign}{short(100 * moved / abs(e.value), 2)} %"
+    return f"{sign}{short(moved, 2)} {e.unit}".rstrip()
 
 
 def _rests_on(

@@ -14,13 +14,19 @@ function curves(id, motion, series, height) {
     legend: { show: false },
     cursor: { y: false },
     scales: { x: { time: false }, y: { range: (u, low, high) => (low < high ? uPlot.rangeNum(low, high, 0.1, true) : [low - 1e-2, low + 1e-2]) } },
-    axes: [{ ...axis(), size: 28 }, axis()],
+    axes: [{ ...axis(), size: 28 }, { ...axis(), size: 52 }].map((one) => ({ ...one, values: ticks })),
     series: [{}, ...series.map((s) => ({ label: s.label, stroke: color(s.tone), width: s.width || 1.6, dash: s.dashed ? [4, 4] : undefined, spanGaps: false }))],
     hooks: { drawClear: [(u) => shadeHeldOut(u, motion)], draw: [(u) => frameLine(u, motion)] },
   };
   const values = series.map((s) => Array.from(s.values, (v) => (v === v ? v : null)));
   drawn[id] = new uPlot(options, [motion.times, ...values], host);
   drawn[id].over.addEventListener("click", () => page.to(drawn[id].cursor.idx));
+}
+
+// Labels of an axis with as many decimals as its steps have; uPlot rounds to three, so that neighbors may read alike.
+function ticks(u, values) {
+  const step = Math.abs(values[1] - values[0]) || 1, decimals = Math.min(9, Math.max(0, Math.ceil(-Math.log10(step) - 1e-9)));
+  return values.map((v) => (v === null ? "" : String(Number(v.toFixed(decimals + 1)))));
 }
 
 function shadeHeldOut(u, motion) {
@@ -68,6 +74,8 @@ function residualCharts(motion) {
     }
   pen.putImageData(image, 0, 0);
   document.getElementById("warmest").textContent = `${(1e3 * motion.residual.largest).toPrecision(3)} mm`;
+  const names = motion.markers;
+  document.getElementById("rows").textContent = names.length > 1 ? `rows from ${names[0]} to ${names[names.length - 1]}` : names[0];
   map.onclick = (e) => {
     const box = map.getBoundingClientRect();
     page.to(Math.floor(((e.clientX - box.left) / box.width) * motion.frames));
@@ -86,20 +94,25 @@ function markerCharts(motion, marker) {
   });
 }
 
+// A matrix of colors. Few parameters are named beside their rows; the columns have the same order.
 function correlationMap(matrix) {
   const canvas = document.getElementById("correlations"), n = matrix.names.length, pen = canvas.getContext("2d");
+  const list = document.getElementById("pairs"), cell = 24;
   canvas.width = canvas.height = n;
-  canvas.style.width = canvas.style.height = `${Math.min(520, 26 * n)}px`;
+  canvas.style.width = canvas.style.height = `${Math.min(520, cell * n)}px`;
+  list.hidden = cell * n > 520;
+  list.replaceChildren(...matrix.names.map((name) => Object.assign(document.createElement("li"), { textContent: name })));
+  list.style.lineHeight = `${cell}px`;
   const image = pen.createImageData(n, n), rgb = (name) => [1, 3, 5].map((k) => parseInt(color(name).slice(k, k + 2), 16));
   matrix.values.forEach((row, i) => row.forEach((v, j) => {
     const to = rgb(v < 0 ? "accent" : "warm"), from = rgb("ground");
     image.data.set([...from.map((a, k) => Math.round(a + (to[k] - a) * Math.abs(v))), 255], 4 * (i * n + j));
   }));
   pen.putImageData(image, 0, 0);
-  canvas.onpointermove = (e) => {
+  canvas.onpointermove = canvas.onpointerdown = (e) => {
     const box = canvas.getBoundingClientRect(), at = (p, size) => Math.min(n - 1, Math.max(0, Math.floor((p / size) * n)));
     const i = at(e.clientY - box.top, box.height), j = at(e.clientX - box.left, box.width);
     document.getElementById("pair").textContent = `${matrix.names[i]} and ${matrix.names[j]}: ${matrix.values[i][j].toFixed(2)}`;
   };
-  document.getElementById("pair").textContent = "Warm is positive, blue is negative. Point at a field for its pair.";
+  document.getElementById("pair").textContent = "Warm is positive, blue is negative; columns have the order of the rows. Point at a field for its pair.";
 }

@@ -43,6 +43,12 @@ function distance(motion, frame, marker) {
   return number === 65535 ? NaN : (number / 65534) * motion.residual.largest;
 }
 
+// A round length in m as people write it.
+function length(x) {
+  const [unit, times] = x < 0.0099 ? ["mm", 1e3] : x < 0.99 ? ["cm", 1e2] : ["m", 1];
+  return `${Number((x * times).toPrecision(3))} ${unit}`;
+}
+
 function color(name) {
   return getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
 }

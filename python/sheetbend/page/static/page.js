@@ -23,7 +23,9 @@ const page = {
       this.element("scrub").oninput = (e) => { this.stop(); this.to(Number(e.target.value)); };
       this.element("play").onclick = () => (this.playing ? this.stop() : this.play());
       this.element("marker").onchange = (e) => this.mark(Number(e.target.value));
-      this.choose(0);
+      const moving = Math.max(0, this.motions.findIndex((m) => m.frames > 1));
+      recording.value = moving;
+      this.choose(moving);
       addEventListener("resize", () => this.charts());
     }
     if (this.data.correlations) {
@@ -47,10 +49,11 @@ const page = {
     const drawn = motion.frames < motion.recorded ? `${motion.frames} of ${motion.recorded} frames are drawn. ` : "";
     const strained = motion.sheets.filter((s) => s.largestStrain > 0);
     const words = strained.map((s) => `${s.name}: the warmest color is a strain of ${(100 * s.largestStrain).toPrecision(2)} %. `);
-    this.element("about-motion").textContent = drawn + words.join("") + (motion.heldOut.some(Boolean) && motion.frames > 1 ? "Shaded times were held out: the fit did not see them." : "");
+    this.element("about-motion").textContent = drawn + words.join("") + (this.space.cell ? `A cell of the floor is ${length(this.space.cell)}. ` : "") + (motion.heldOut.some(Boolean) && motion.frames > 1 ? "Shaded times were held out: the fit did not see them." : "");
     const marker = this.element("marker");
     marker.replaceChildren(...motion.markers.map((name, m) => new Option(name, m)));
     this.element("residuals").hidden = !(motion.measured && motion.frames > 1);
+    this.element("residuals").querySelector("h2").textContent = motion.simulated ? "Measured against simulated" : "Markers over time";
     this.charts();
     const asked = Number(new URLSearchParams(location.hash.slice(1)).get("t")); // page.html#t=0.8 opens at 0.8 s
     this.to(Math.max(0, motion.times.findIndex((t) => t >= asked)));

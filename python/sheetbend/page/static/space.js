@@ -43,36 +43,70 @@ class Space {
     if (motion.simulated) this.layers.push(this.dots("simulated", motion.simulated, n, "accent", 0.0075 * size));
     if (motion.baseline) this.layers.push(this.dots("no physics", motion.baseline, n, "sun", 0.005 * size));
     if (motion.measured && motion.simulated) this.layers.push(this.errors());
+    this.box = this.bounds();
+    this.layers.push(this.floor());
     for (const layer of this.layers) this.scene.add(layer.object);
     this.look();
     this.resize();
   }
 
-  look() {
+  // Upward; z where the motion does not tell.
+  get up() {
     const up = new THREE.Vector3(...this.motion.up);
-    if (up.length() === 0) up.set(0, 0, 1);
-    // across: the horizontal direction that is widest over all frames
-    const across = this.widest(up), toward = new THREE.Vector3().crossVectors(across, up).normalize();
-    const away = (1.05 * this.motion.extent) / Math.min(1, this.host.clientWidth / Math.max(this.host.clientHeight, 1));
-    this.camera.up.copy(up);
-    this.camera.position.copy(toward.multiplyScalar(1.6 * away).addScaledVector(across, 0.5 * away).addScaledVector(up, 0.45 * away));
-    this.controls.target.set(0, 0, 0);
-    this.camera.near = 1e-3 * this.motion.extent;
-    this.camera.far = 50 * this.motion.extent;
+    return up.length() === 0 ? up.set(0, 0, 1) : up;
+  }
+
+  // The lowest and highest coordinates of all that is drawn, over all frames.
+  bounds() {
+    const { measured, simulated, baseline, sheets, lines, ticks } = this.motion;
+    const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+    for (const x of [measured, simulated, baseline, ...[...sheets, ...lines, ...ticks].map((part) => part.places)])
+      for (let i = 0; x && i < x.length; ++i)
+        if (x[i] === x[i]) { low[i % 3] = Math.min(low[i % 3], x[i]); high[i % 3] = Math.max(high[i % 3], x[i]); }
+    return { low, high };
+  }
+
+  corners() {
+    const { low, high } = this.box;
+    return Array.from({ length: 8 }, (_, k) => new THREE.Vector3(...[0, 1, 2].map((c) => ((k >> c) & 1 ? high : low)[c])));
+  }
+
+  // From the side on which the motion is widest, so far away that all of it is in the picture.
+  look() {
+    const { up, camera } = this, across = this.widest(up), toward = new THREE.Vector3().crossVectors(across, up).normalize();
+    const from = toward.multiplyScalar(1.6).addScaledVector(across, 0.5).addScaledVector(up, 0.45).normalize();
+    const right = new THREE.Vector3().crossVectors(up, from).normalize(), above = new THREE.Vector3().crossVectors(from, right);
+    const middle = new THREE.Vector3(...this.box.low.map((low, c) => 0.5 * (low + this.box.high[c])));
+    const half = Math.tan((0.5 * camera.fov * Math.PI) / 180), aspect = this.host.clientWidth / Math.max(this.host.clientHeight, 1) || 1;
+    const needed = this.corners().map((corner) => {
+      const p = corner.sub(middle);
+      return p.dot(from) + Math.max(Math.abs(p.dot(right)) / aspect, Math.abs(p.dot(above))) / half;
+    });
+    camera.up.copy(up);
+    camera.position.copy(middle).addScaledVector(from, 1.1 * Math.max(...needed));
+    this.controls.target.copy(middle);
+    camera.near = 1e-3 * this.motion.extent;
+    camera.far = 50 * this.motion.extent;
     this.controls.update();
   }
 
+  // The horizontal direction in which the motion is widest.
   widest(up) {
-    const parts = [...this.motion.sheets, ...this.motion.lines].map((p) => p.places);
-    const all = parts.length ? parts : [this.motion.measured || new Float32Array(3)];
-    const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-    for (const x of all)
-      for (let i = 0; i < x.length; ++i)
-        if (x[i] === x[i]) { low[i % 3] = Math.min(low[i % 3], x[i]); high[i % 3] = Math.max(high[i % 3], x[i]); }
-    const axes = [0, 1, 2].sort((a, b) => Math.abs(this.motion.up[a]) - Math.abs(this.motion.up[b]) || high[b] - low[b] - (high[a] - low[a]));
-    const axis = new THREE.Vector3(), pick = high[axes[0]] - low[axes[0]] >= high[axes[1]] - low[axes[1]] ? axes[0] : axes[1];
-    axis.setComponent(pick, 1).addScaledVector(up, -up.getComponent(pick)).normalize();
-    return axis;
+    const size = (axis) => this.box.high[axis] - this.box.low[axis];
+    const axes = [0, 1, 2].sort((a, b) => Math.abs(up.getComponent(a)) - Math.abs(up.getComponent(b)) || size(b) - size(a));
+    const axis = new THREE.Vector3(), pick = size(axes[0]) >= size(axes[1]) ? axes[0] : axes[1];
+    return axis.setComponent(pick, 1).addScaledVector(up, -up.getComponent(pick)).normalize();
+  }
+
+  // A level grid below everything, which shows the scale: cells of 1, 2 or 5 times a power of ten.
+  floor() {
+    const { up } = this, heights = this.corners().map((corner) => corner.dot(up)), rough = this.motion.extent / 8;
+    const decade = 10 ** Math.floor(Math.log10(rough));
+    this.cell = decade * [1, 2, 5, 10].find((times) => times * decade >= rough);
+    const object = new THREE.GridHelper(10 * this.cell, 10, color("calm"), color("pale"));
+    object.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), up);
+    object.position.copy(up).multiplyScalar(Math.min(...heights) - 0.02 * this.motion.extent);
+    return { name: "floor", tone: "calm", object, at() {} };
   }
 
   line(part, radius) {

@@ -13,6 +13,7 @@ from ...arrays.timeseries import Array
 from ...errors import RecordingError
 from .lost import without_zeros
 
+_NOT_SEEN = {"na", "n/a", "null", "none"}  # as tables of other programs write a cell without a value, beside nan
 Row = tuple[int, list[str]]  # line number in the file, from 1, and the cells
 
 
@@ -40,8 +41,8 @@ def split(path: Path, number: int, line: str, delimiter: str) -> list[str]:
 
 
 def number(path: Path, line: int, cell: str) -> float:
-    """A cell as a number; NaN where it is empty."""
-    if not cell:
+    """A cell as a number; NaN where it is empty or says that there is none."""
+    if not cell or cell.lower() in _NOT_SEEN:
         return np.nan
     try:
         found = float(cell.replace("_", "?"))  # Python would read 1_0 as ten

@@ -17,6 +17,8 @@ _NAME = re.compile(rf"(%time)|(?:{_WORDS})[\s_/]*[(\[]?\s*(s|sec|seconds|ms|us|n
 _LONGEST = 40  # characters: blanks of a longer one would be matched in ever more ways
 _PER_SECOND = {"ms": 10**3, "us": 10**6, "ns": 10**9}
 _LATEST = 1e11  # s: later than any clock that counts seconds
+_SHORTEST = 1e-7  # s between two frames, which no camera reaches
+_FEW = 10  # rows from which on this is judged
 
 
 def unit(name: str) -> str | None:
@@ -33,7 +35,7 @@ def times(path: Path, rows: Sequence[Row], unit: str) -> Array:
     """(rows,) s, of the first cells. Those of finer units count from the earliest, so that stamps keep their digits.
 
     Raises:
-        RecordingError: a cell is no number, or its seconds are no time.
+        RecordingError: a cell is no number, or its seconds are no time, or frames are too near for the unit.
     """
     if unit == "s":
         found = np.array([number(path, line, cells[0]) for line, cells in rows])
@@ -44,7 +46,18 @@ def times(path: Path, rows: Sequence[Row], unit: str) -> Array:
         return found
     exact = [_exact(path, line, cells[0]) for line, cells in rows]
     first = min((time for time in exact if time is not None), default=Decimal(0))
-    return np.array([np.nan if t is None else float((t - first) / _PER_SECOND[unit]) for t in exact])
+    found = np.array([np.nan if t is None else float((t - first) / _PER_SECOND[unit]) for t in exact])
+    apart = np.abs(np.diff(found))
+    if len(found) >= _FEW and 0.0 < np.nanmedian(apart) < _SHORTEST:
+        fix = "name the column after the unit that it counts: time, time_ms, time_us or time_ns"
+        refuse(
+            path,
+            rows[1][0],
+            f"has a time in {unit}, {np.nanmedian(apart):.2g} s after the row before",
+            rows[1][1][0],
+            fix,
+        )
+    return found
 
 
 def _exact(path: Path, line: int, cell: str) -> Decimal | None:

@@ -78,6 +78,10 @@ def _marker(way: re.Pattern[str], names: Sequence[str]) -> str | None:
 
 
 def _refuse_three(path: Path, line: int, names: Sequence[str]) -> NoReturn:
+    axes = [name[-1:].lower() for name in names]
+    if axes == ["x", "y", "x"] or (len(names) == 2 and axes == ["x", "y"]):
+        fix = "write a third column for each marker, of zeros if all moves in one plane, and lengths in m, cm or mm"
+        refuse(path, line, "has only x and y of a marker", names[0], fix)
     first = _WAYS[0].fullmatch(names[0])
     marker = first["marker"] if first and first["axis"].lower() == "x" else names[0]
     wanted = [f"{marker}_{axis}" for axis in AXES]

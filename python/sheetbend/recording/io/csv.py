@@ -116,7 +116,7 @@ def _delimiter(path: Path, number: int, header: str) -> str:
         counts |= len(cells) > 1 and _FRAME.fullmatch(cells[0]) is not None
         if counts and "rate" in sidecar.beside(path):
             return delimiter
-    fix = "start with time,<marker>_x,<marker>_y,<marker>_z,... or time,marker,x,y,z"
+    fix = "start with time,<marker>_x,<marker>_y,<marker>_z,... or time,marker,x,y,z, and one row per frame below"
     if counts:
         beside = path.with_suffix(".json").name
         fix = f'give a column of times, or write {{"rate": 100}} with the frames per second into {beside}'
