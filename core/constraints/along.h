@@ -11,6 +11,8 @@ namespace sheetbend {
 struct Progress {
   static constexpr int vectors = 3, rows = 1, parameters = 1;
   static constexpr bool linear = false;
+  static constexpr Unit unit = units::meters;
+  static constexpr std::array own{Parameter{"rest", unit, ranges::any, defaults::usually(0.0)}};
   template <class T>
   static void evaluate(const T* y, const T* p, T* C, T* J) {
     const Vec3<T> way = Vec3<T>(y + 3) - Vec3<T>(y), direction(y + 6);
@@ -21,19 +23,23 @@ struct Progress {
   }
 };
 
-struct Along : OnTwoBodies<Progress, BodyPoint<0, 2>, BodyPoint<1, 5>, BodyDirection<2>> {
+// A law of the two points and the direction. Its parameters are their places in the bodies, then the law's `own`.
+template <class Law>
+struct AlongDirection : OnTwoBodies<Law, BodyPoint<0, 2>, BodyPoint<1, 5>, BodyDirection<2>> {
+  static constexpr Unit unit = units::meters;
+  static constexpr std::array parameters =
+      joined(place_in_body("first_x", "first_y", "first_z"),     //
+             place_in_body("second_x", "second_y", "second_z"),  //
+             direction_in_body("direction_x", "direction_y", "direction_z"), Law::own);
+};
+
+struct Along : AlongDirection<Progress> {
   static constexpr const char* name = "along";
   static constexpr const char* about =
       "how far a point of the second body lies from one of the first along a direction of the first, less a rest "
       "length";
-  static constexpr Unit unit = units::meters;
   static constexpr Compliance compliance{"displacement / force, 0 for a joint"};
   static constexpr int offsets = 1;
-  static constexpr std::array parameters =
-      joined(place_in_body("first_x", "first_y", "first_z"),     //
-             place_in_body("second_x", "second_y", "second_z"),  //
-             direction_in_body("direction_x", "direction_y", "direction_z"),
-             std::array{Parameter{"rest", units::meters, ranges::any, defaults::usually(0.0)}});
 };
 
 }  // namespace sheetbend

@@ -15,6 +15,8 @@ namespace sheetbend {
 struct Turn {
   static constexpr int vectors = 4, rows = 1, parameters = 1;
   static constexpr bool linear = false, periodic = true;
+  static constexpr Unit unit = units::radians;
+  static constexpr std::array own{Parameter{"rest", unit, ranges::any, defaults::usually(0.0)}};
   template <class T>
   static void evaluate(const T* y, const T* p, T* C, T* J) {
     const Vec3<T> e(y), f(y + 3), u(y + 6);
@@ -28,19 +30,24 @@ struct Turn {
   }
 };
 
-struct JointAngle : CarriedOn<Turn, 0, 2, 1, BodyDirection<0>, BodyDirection<0>, BodyDirection<3>, NodeItself<6>> {
+// A law of e, f and u, and of the dial where it takes a fourth vector. Its parameters are those of the directions, then the law's `own`.
+template <class Law, class... Dial>
+struct AboutHinge
+    : CarriedOn<Law, 0, 2, sizeof...(Dial), BodyDirection<0>, BodyDirection<0>, BodyDirection<3>, Dial...> {
+  static constexpr Unit unit = units::radians;
+  static constexpr std::array parameters = joined(direction_in_body("along_x", "along_y", "along_z"),     //
+                                                  direction_in_body("across_x", "across_y", "across_z"),  //
+                                                  direction_in_body("second_x", "second_y", "second_z"), Law::own);
+};
+using HingeDial = NodeItself<6>;
+
+struct JointAngle : AboutHinge<Turn, HingeDial> {
   static constexpr const char* name = "joint_angle";
   static constexpr const char* about =
       "the angle of one body against another about a hinge, less a rest angle and the x of the last particle";
-  static constexpr Unit unit = units::radians;
   static constexpr Compliance compliance{"angle / torque, 0 for a servo"};
   static constexpr bool periodic = true;
   static constexpr int offsets = 1;
-  static constexpr std::array parameters =
-      joined(direction_in_body("along_x", "along_y", "along_z"),     //
-             direction_in_body("across_x", "across_y", "across_z"),  //
-             direction_in_body("second_x", "second_y", "second_z"),
-             std::array{Parameter{"rest", units::radians, ranges::any, defaults::usually(0.0)}});
 };
 
 }  // namespace sheetbend

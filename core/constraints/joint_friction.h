@@ -12,6 +12,7 @@ namespace sheetbend {
 struct TurnFromSet {
   static constexpr int vectors = Turn::vectors, rows = 1, parameters = 1, inner_parameters = 1;
   static constexpr bool linear = false;
+  static constexpr std::array own{Parameter{"yield", units::radians, ranges::positive, defaults::given}};
   template <class T>
   static void evaluate(const T* y, const T*, T* C, T* J) {
     const T rest(0.0);
@@ -28,24 +29,14 @@ struct DryTurn : TurnFromSet {
   }
 };
 
-template <class Law>
-struct AboutHinge : CarriedOn<Law, 0, 2, 1, BodyDirection<0>, BodyDirection<0>, BodyDirection<3>, NodeItself<6>> {
-  static constexpr std::array parameters =
-      joined(direction_in_body("along_x", "along_y", "along_z"),     //
-             direction_in_body("across_x", "across_y", "across_z"),  //
-             direction_in_body("second_x", "second_y", "second_z"),
-             std::array{Parameter{"yield", units::radians, ranges::positive, defaults::given}});
-};
-
-struct JointFriction : AboutHinge<DryTurn> {
+struct JointFriction : AboutHinge<DryTurn, HingeDial> {
   static constexpr const char* name = "joint_friction";
   static constexpr const char* about =
       "the angle of one body against another about a hinge, from the one it slid to, which is the x of the last "
       "particle (pinned)";
-  static constexpr Unit unit = units::radians;
   static constexpr Compliance compliance = yield_over_torque;
   static constexpr int yield_parameter = 9;
-  using Slider = AboutHinge<TurnFromSet>;
+  using Slider = AboutHinge<TurnFromSet, HingeDial>;
 };
 
 }  // namespace sheetbend
