@@ -12,8 +12,9 @@ from pytest import approx
 from sheetbend.doubts.beginnings import beginnings, checked
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.growth import growths
-from sheetbend.minimum.optimizers import Minimum, minimize
+from sheetbend.minimum.optimizers import minimize
 from sheetbend.minimum.problem import FitProblem
+from sheetbend.minimum.progress import Minimum
 from sheetbend.minimum.search import Search
 from sheetbend.objects.arm import add_arm
 

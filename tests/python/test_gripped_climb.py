@@ -35,7 +35,7 @@ from sheetbend.gripped.pieces import experiments_of, problem_of
 from sheetbend.gripped.search import Search
 from sheetbend.gripped.start import about, started, whole
 from sheetbend.gripped.steps import Rope
-from sheetbend.minimum.journal import Evaluator
+from sheetbend.minimum.evaluator import Evaluator
 from sheetbend.minimum.optimizers import minimize
 from sheetbend.minimum.problem import FitProblem
 from test_gripped_motion import carried_about, model_of

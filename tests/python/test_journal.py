@@ -19,10 +19,12 @@ import pytest
 import sheetbend as sb
 from sheetbend import _core
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum import content, journal
+from sheetbend.minimum import content, journal, journal_values
+from sheetbend.minimum.by_ceres import has_ceres
 from sheetbend.minimum.journal import Journal
-from sheetbend.minimum.optimizers import Progress, has_ceres, minimize
+from sheetbend.minimum.optimizers import minimize
 from sheetbend.minimum.problem import FitProblem
+from sheetbend.minimum.progress import Progress
 from sheetbend.minimum.time_step import halved
 
 WANTED = ("rope_EI", "rope_bend_damping")
@@ -122,9 +124,9 @@ class TestEvaluations:
     def test_only_what_is_not_zero_of_a_jacobian_is_kept(self) -> None:
         J = np.zeros((40, 30))
         J[3:7, 2:4], J[9, 9], J[10, 10] = np.pi, -0.0, np.nan
-        packed = journal._packed(J)
+        packed = journal_values.pack(J)
         assert len(packed) == 40 * 30 / 8 + 8 * 10
-        assert journal._unpacked(packed, 40, 30).tobytes() == J.tobytes()
+        assert journal_values.unpack(packed, 40, 30).tobytes() == J.tobytes()
 
     def test_one_that_fails_is_made_again(self, path: Path) -> None:
         for _ in range(2):

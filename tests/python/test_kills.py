@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from sheetbend.minimum.optimizers import has_ceres
+from sheetbend.minimum.by_ceres import has_ceres
 
 PROGRAM = Path(__file__).resolve().parents[2] / "tools" / "kills.py"
 KINDS = ["ceres", "scipy", "profiles", "gripped"]

@@ -13,11 +13,14 @@ import sheetbend.minimum.search as search
 from pytest import approx
 from sheetbend.doubts import profiles
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum import discretization, optimizers
+from sheetbend.minimum import by_ceres, discretization, slope
+from sheetbend.minimum.by_ceres import has_ceres
 from sheetbend.minimum.discretization import Refinement
-from sheetbend.minimum.journal import Evaluator, Timed
-from sheetbend.minimum.optimizers import Progress, has_ceres, minimize
+from sheetbend.minimum.evaluator import Evaluator
+from sheetbend.minimum.journal import Timed
+from sheetbend.minimum.optimizers import minimize
 from sheetbend.minimum.problem import FitProblem
+from sheetbend.minimum.progress import Best, Minimum, Progress
 
 fitting = importlib.import_module("sheetbend.fitting.fit")  # the name in the package is the function
 
@@ -57,7 +60,7 @@ def test_ceres_tells_of_failures_in_its_result_alone(capfd):
     problem = problem_of(swinging())
     far = np.full(len(problem.parameters.initial()), 900.0)
     problem.parameters.limits = lambda: (np.full(len(far), -np.inf), np.full(len(far), np.inf))
-    end = optimizers._ceres(problem, far, 5, 1e-10, optimizers._Best(None, far, np.inf))
+    end = by_ceres.search(problem, far, 5, 1e-10, Best(None, far, np.inf))
     assert not end.converged and end.iterations == 0
     assert "evaluation failed" in end.message
     assert capfd.readouterr() == ("", "")
@@ -75,7 +78,7 @@ def test_ceres_ends_at_the_minimum_beside_a_limit(initial):
     ended where a step still promised a good part of the cost."""
     problem = limited(initial=initial, lower=0.025)
     end, _ = minimize(problem, problem.parameters.initial(), "ceres")
-    assert end.converged and optimizers.promised(problem, end.u) < 1e-8
+    assert end.converged and slope.promised(problem, end.u) < 1e-8
     assert end.u[1] == approx(np.log(0.025), rel=1e-15)
     assert end.evaluations < 60  # 166
     other, _ = minimize(problem, problem.parameters.initial(), "scipy", tolerance=1e-14)
@@ -97,14 +100,14 @@ def test_ceres_leaves_a_limit_that_nothing_presses_on(monkeypatch):
     problem = limited(initial=0.06, lower=0.025)
     resting = [frozenset(), frozenset(), frozenset({1}), frozenset()]
     runs = []
-    run = optimizers._ceres_holding
+    run = by_ceres.holding
 
     def counted(problem, w, held, most, tolerance, best, watch, *more):
         runs.append((held, watch))
         return run(problem, w, held, most, tolerance, best, watch, *more)
 
-    monkeypatch.setattr(optimizers, "_ceres_holding", counted)
-    monkeypatch.setattr(optimizers, "_resting", lambda problem, w: resting.pop(0))
+    monkeypatch.setattr(by_ceres, "holding", counted)
+    monkeypatch.setattr(by_ceres, "_resting", lambda problem, w: resting.pop(0))
     minimize(problem, problem.parameters.initial(), "ceres")
     assert runs == [(frozenset(), True), (frozenset(), False)]
     minimize(problem, problem.parameters.initial(), "ceres")
@@ -370,9 +373,9 @@ def test_an_end_at_a_kink_is_no_convergence(optimizer):
     ("promised", "converged", "doubted"), [(1e-6, True, False), (0.01, True, True), (0.5, False, True)]
 )
 def test_a_slope_at_the_end_is_told_and_a_steep_one_is_no_end(monkeypatch, promised, converged, doubted):
-    end = optimizers.Minimum(np.zeros(1), 2.0, 3, 4, True, False, "small steps")
-    monkeypatch.setattr(optimizers, "promised", lambda problem, u: promised)
-    found = optimizers.judged(None, end, first=10.0)
+    end = Minimum(np.zeros(1), 2.0, 3, 4, True, False, "small steps")
+    monkeypatch.setattr(slope, "promised", lambda problem, u: promised)
+    found = slope.judged(None, end, first=10.0)
     assert (found.converged, bool(found.doubt)) == (converged, doubted)
     assert found.message.endswith("small steps")
 

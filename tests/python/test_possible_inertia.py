@@ -10,8 +10,9 @@ import sheetbend as sb
 from sheetbend.doubts.touching import _refitted
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.approach import Approach
+from sheetbend.minimum.by_ceres import has_ceres
 from sheetbend.minimum.coordinates import Coordinates
-from sheetbend.minimum.optimizers import has_ceres, minimize
+from sheetbend.minimum.optimizers import minimize
 from sheetbend.minimum.problem import FitProblem
 
 POINTS = 0.05 * np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])

@@ -23,9 +23,10 @@ import pytest
 import sheetbend as sb
 from commands import last_line, run
 from sheetbend import cli
-from sheetbend.minimum import optimizers
+from sheetbend.minimum import by_ceres
+from sheetbend.minimum.by_ceres import has_ceres
 from sheetbend.minimum.journal import Journal
-from sheetbend.minimum.optimizers import Progress, has_ceres
+from sheetbend.minimum.progress import Progress
 from typer.testing import Result
 
 WRITTEN = {
@@ -311,9 +312,9 @@ class TestMissing:
             return import_module(name, package)
 
         monkeypatch.setattr(importlib, "import_module", refused)
-        optimizers.ceres_trouble.cache_clear()
+        by_ceres.ceres_trouble.cache_clear()
         yield
-        optimizers.ceres_trouble.cache_clear()
+        by_ceres.ceres_trouble.cache_clear()
 
     @pytest.mark.usefixtures("broken_ceres")
     def test_a_ceres_that_does_not_load_is_stood_in_for(self, config: Path) -> None:

@@ -14,9 +14,10 @@ from pytest import approx
 from sheetbend.errors import InputError, SheetbendError
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.approach import Approach, inside
+from sheetbend.minimum.by_ceres import has_ceres
 from sheetbend.minimum.coordinates import LOG_STEP, step_limits
 from sheetbend.minimum.growth import Growth
-from sheetbend.minimum.optimizers import has_ceres, minimize
+from sheetbend.minimum.optimizers import minimize
 from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.search import Search
 from sheetbend.minimum.windows import chosen, cut

@@ -17,8 +17,8 @@ from ..errors import ConfigError
 from ..experiment.experiment import Experiment
 from ..files.door import reading
 from ..gripped.plausible import doubts, gravities
+from ..minimum.by_ceres import ceres_trouble, has_ceres
 from ..minimum.growth import in_words, over_fit
-from ..minimum.optimizers import ceres_trouble, has_ceres
 from ..quantities.kinds import KINDS
 from ..recording.io import FORMATS
 from ..recording.recording import Recording

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from ..minimum.optimizers import Progress
+from ..minimum.progress import Progress
 from ..quantities.parameters import Parameters
 
 SHOWN = 4  # parameters on the line

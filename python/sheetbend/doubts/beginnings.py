@@ -27,8 +27,8 @@ from ..errors import SheetbendError
 from ..minimum.discretization import Refinement
 from ..minimum.growth import Growth
 from ..minimum.linear_step import one_step
-from ..minimum.optimizers import Minimum
 from ..minimum.problem import FitProblem
+from ..minimum.progress import Minimum
 from ..minimum.search import Search, fitted_window
 from ..minimum.time_step import SECOND_ORDER
 from ..minimum.windows import chosen, cut

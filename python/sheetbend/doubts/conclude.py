@@ -11,8 +11,8 @@ from ..arrays.timeseries import Array
 from ..experiment.wanted import quantities_of
 from ..minimum.growth import Growth
 from ..minimum.linear_step import gauss_newton
-from ..minimum.optimizers import Minimum
 from ..minimum.problem import FitProblem
+from ..minimum.progress import Minimum
 from ..quantities.parameters import Parameters
 from ..quantities.wording import short
 from ..result.estimate import UNSOUND, Estimate

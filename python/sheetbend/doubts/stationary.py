@@ -9,9 +9,10 @@ import numpy as np
 from ..arrays.timeseries import Array
 from ..errors import SheetbendError
 from ..minimum.linear_step import gauss_newton
-from ..minimum.optimizers import ROUNDING, Minimum, promised
 from ..minimum.problem import FitProblem
+from ..minimum.progress import Minimum
 from ..minimum.search import Search
+from ..minimum.slope import ROUNDING, promised
 from ..quantities.wording import short
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of
@@ -29,7 +30,7 @@ def no_minimum(problem: FitProblem, end: Minimum) -> str:
     """Why the end of an optimizer is no minimum, in words; empty where it is one.
 
     An end above its own start is none: windows led away, and nothing on the whole motion leads back. An end that
-    `optimizers.judged` refused is none. One that was stopped (by Ctrl-C, by the number of iterations) is none where a
+    `slope.judged` refused is none. One that was stopped (by Ctrl-C, by the number of iterations) is none where a
     Gauss-Newton step promises more than `FAR` of the cost. One near its start with large residuals is none where a
     small change of a single parameter lowers the cost: two to four simulations for each, in that case alone.
     """

@@ -17,12 +17,13 @@ from ..doubts.prediction import Comparison, compare
 from ..errors import InputError
 from ..experiment.experiment import Experiment
 from ..experiment.wanted import ParameterLike, as_parameters
+from ..minimum.by_ceres import ceres_trouble
 from ..minimum.continuity import joined
 from ..minimum.discretization import Refinement, wanted_refinement
 from ..minimum.journal import journaled
 from ..minimum.linear_algebra import one_blas_thread
-from ..minimum.optimizers import Observer, ceres_trouble
 from ..minimum.problem import FitProblem
+from ..minimum.progress import Observer
 from ..minimum.search import Search
 from ..minimum.smooth import Smooth, settled, with_fields
 from ..minimum.workers import shared_out

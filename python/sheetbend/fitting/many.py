@@ -16,7 +16,7 @@ from ..experiment.wanted import ParameterLike, as_parameters
 from ..minimum.blocks import Arrow, ManyApproach, ManyProblem, reduced
 from ..minimum.counts import counted
 from ..minimum.linear_algebra import one_blas_thread
-from ..minimum.optimizers import Progress
+from ..minimum.progress import Progress
 from ..minimum.workers import shared_out
 from ..optional import require
 from ..quantities.parameters import Parameter, Parameters

@@ -10,8 +10,8 @@ from ..doubts.beginnings import Beginning, checked
 from ..doubts.conclude import without_verdict
 from ..doubts.stationary import from_start
 from ..minimum.growth import Growth, growths
-from ..minimum.optimizers import Minimum
 from ..minimum.problem import FitProblem
+from ..minimum.progress import Minimum
 from ..minimum.search import Found, Search
 from ..result.estimate import Estimate
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..doubts.prediction import Comparison
 from ..minimum.growth import Growth
-from ..minimum.optimizers import Minimum
+from ..minimum.progress import Minimum
 from ..minimum.race import Raced
 from ..quantities.parameters import Parameters
 from ..result.estimate import Given, ProfileCurve

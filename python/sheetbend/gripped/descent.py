@@ -15,8 +15,8 @@ import numpy as np
 
 from ..arrays.timeseries import Array
 from ..minimum.approach import Approach
-from ..minimum.optimizers import ROUNDING, STUCK
 from ..minimum.problem import FitProblem
+from ..minimum.slope import ROUNDING, STUCK
 from .model import NAME
 
 DISTANCE = 0.1  # standard deviations to the minimum, of a parameter, at which a descent has ended

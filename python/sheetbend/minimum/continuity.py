@@ -29,9 +29,10 @@ from .growth import over_fit
 from .lifted import Lifted
 from .lifted_motion import Motion
 from .lifted_starts import begun
-from .optimizers import Observer, walked
+from .optimizers import walked
 from .parts import expanded_to
 from .problem import FitProblem
+from .progress import Observer
 
 GROWN = 10.0  # of small displacements, over a window that is chosen
 PARTS = 10  # at least, of a motion whose windows are chosen

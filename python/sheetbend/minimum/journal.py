@@ -27,17 +27,15 @@ from typing import ParamSpec, Protocol, Self, TypeVar
 
 import numpy as np
 
-from .. import _core
 from ..errors import InputError
 from . import content
-from .coordinates import Coordinates
+from .journal_values import pack, seal, unpack, unseal
 
 COMMIT_SECONDS = 0.1  # at least, between commits: what a kill may cost besides the evaluation under way
 SHARE, GRACE = 0.02, 0.05  # of the time of evaluations, and s, that writing may take; what is beyond is made again
 LARGEST_JACOBIAN = 64e6  # bytes; a larger one is made again
 ROOM = 1e9  # bytes, of all values; when it is full no more Jacobians are kept, and no more residuals at twice as much
 RESERVE = 30e6  # bytes of the disk that are left to the results
-SEAL = 8  # bytes of the digest behind every value: SQLite does not see damage inside of one
 TABLES = (
     "about (part TEXT, label TEXT, text TEXT NOT NULL, PRIMARY KEY (part, label))",
     "evaluation (key BLOB PRIMARY KEY, residuals BLOB NOT NULL, seconds REAL, jacobian BLOB, jacobian_seconds REAL, "
@@ -207,19 +205,19 @@ class Journal(AbstractContextManager["Journal"]):
                 return None
         try:
             r, packed, seconds, state = row
-            residuals = np.frombuffer(_opened(key, r)).copy()
-            J = _unpacked(_opened(key, packed), len(residuals), free) if jacobian else np.zeros((0, free))
-            return (True, residuals, J), None if seconds is None else float(seconds), _opened(key, state)
+            residuals = np.frombuffer(unseal(key, r)).copy()
+            J = unpack(unseal(key, packed), len(residuals), free) if jacobian else np.zeros((0, free))
+            return (True, residuals, J), None if seconds is None else float(seconds), unseal(key, state)
         except (TypeError, ValueError):  # damaged: it is made again
             self._known.pop(key, None)  # another thread may have found it too
             return None
 
     def _keep(self, key: bytes, found: Evaluation, jacobian: bool, seconds: float, state: bytes) -> None:
-        residuals = _sealed(key, found[1].tobytes())
-        packed = _sealed(key, _packed(found[2])) if jacobian else None
+        residuals = seal(key, found[1].tobytes())
+        packed = seal(key, pack(found[2])) if jacobian else None
         if packed is not None and (len(packed) > LARGEST_JACOBIAN or self._size + len(packed) > ROOM):
             packed = None
-        state = _sealed(key, state)
+        state = seal(key, state)
         more = len(packed or b"") + (0 if key in self._known else len(residuals) + len(state))
         if (key in self._known and packed is None) or self._size + more > 2 * ROOM:
             return
@@ -266,70 +264,6 @@ class Journal(AbstractContextManager["Journal"]):
         self._say(self.trouble)
 
 
-class Evaluated(Protocol):
-    """What can be evaluated: a compiled problem, or one that workers evaluate."""
-
-    @property
-    def rows(self) -> int: ...
-
-    @property
-    def parameters(self) -> int: ...
-
-    def evaluate(self, u: np.ndarray, jacobian: bool) -> Evaluation: ...
-
-    def state(self) -> np.ndarray: ...
-
-    def restore(self, state: np.ndarray) -> None: ...
-
-
-class Evaluator:
-    """Evaluates a problem, through the journal that was open when it was made, if one was."""
-
-    def __init__(self, core: Evaluated, made_from: Callable[[], Mapping[str, str]]) -> None:
-        """With the digests of what the problem is made from, which are asked for when the journal first needs them."""
-        self._core, self._journal = core, current()
-        self._made_from: Callable[[], Mapping[str, str]] | None = None if self._journal is None else made_from
-        self._key = b""
-
-    def __call__(self, u: np.ndarray, jacobian: bool) -> Timed:
-        """(ok, residuals, Jacobian), and the seconds that it took when it was made, where they are known."""
-        if self._journal is None:
-            began = time.perf_counter()
-            found = self._core.evaluate(u, jacobian)
-            return found, time.perf_counter() - began
-        if self._made_from is not None:
-            self._key, self._made_from = self._journal.problem(self._made_from()), None
-        key, state = self._key, self._state()
-        if state:
-            key += content.digest([state, jacobian]).encode()  # a Jacobian too changes the state
-        found, seconds, behind = self._journal.evaluate(
-            key, u, jacobian, lambda: self._core.evaluate(u, jacobian), self._state
-        )
-        if behind:
-            self._core.restore(np.frombuffer(behind))
-        return found, seconds
-
-    def _state(self) -> bytes:
-        return self._core.state().tobytes()
-
-    def capsule(self, coordinates: Coordinates, known: tuple[np.ndarray, Timed] | None = None) -> object:
-        """The journaled problem for Ceres, in the coordinates of a search; the problem must outlive it.
-
-        Args:
-            known: a point w and the evaluation there with a Jacobian, which is not made again.
-        """
-        if known is None and self._journal is None and not coordinates.charts and isinstance(self._core, _core.Problem):
-            return self._core.evaluation()
-
-        def evaluated(w: np.ndarray, jacobian: bool) -> Timed:
-            if known is not None and np.array_equal(w, known[0]):
-                return known[1]
-            (ok, r, J), seconds = self(coordinates.out(w), jacobian)
-            return (ok, r, coordinates.jacobian(J, w) if jacobian and ok else J), seconds
-
-        return _core.evaluation_of(self._core.rows, self._core.parameters, evaluated, bool(self._state()))
-
-
 class Interruptible(Protocol):
     """A result that knows whether it is one of a finished work."""
 
@@ -365,36 +299,3 @@ def remove(path: Path) -> None:
     """Remove a journal, and what SQLite may have left beside it after a kill."""
     for end in ("", "-wal", "-shm"):
         path.with_name(path.name + end).unlink(missing_ok=True)
-
-
-def _sealed(key: bytes, value: bytes) -> bytes:
-    """A value with a digest of it behind."""
-    return value + hashlib.blake2b(value, key=key, digest_size=SEAL).digest()
-
-
-def _opened(key: bytes, sealed: bytes) -> bytes:
-    """The value.
-
-    Raises:
-        ValueError, TypeError: it was changed.
-    """
-    value = bytes(sealed[:-SEAL])
-    if _sealed(key, value) != sealed:
-        raise ValueError("is damaged")
-    return value
-
-
-def _packed(jacobian: np.ndarray) -> bytes:
-    """Which numbers have bits that are not zero, and those numbers. Most of a Jacobian with private parameters is
-    zero."""
-    flat = np.ascontiguousarray(jacobian).ravel()
-    there = flat.view(np.uint64) != 0
-    return np.packbits(there).tobytes() + flat[there].tobytes()
-
-
-def _unpacked(packed: bytes, rows: int, columns: int) -> np.ndarray:
-    bits = (rows * columns + 7) // 8
-    there = np.unpackbits(np.frombuffer(packed, np.uint8, bits), count=rows * columns).astype(bool)
-    flat = np.zeros(rows * columns)
-    flat[there] = np.frombuffer(packed, offset=bits)
-    return flat.reshape(rows, columns)

@@ -19,7 +19,8 @@ from ..statistics.layout import Layout
 from . import content
 from .coordinates import Coordinates, sums_of
 from .counts import count
-from .journal import Evaluator, Timed
+from .evaluator import Evaluator
+from .journal import Timed
 from .lifted import Known, Lifted, WithStates, lifted
 from .on_the_way import OnTheWay
 from .parts import expanded_to, reaching

@@ -18,9 +18,11 @@ from ..errors import InputError, SheetbendError
 from .approach import LEAST, Approach, Tally
 from .conditioning import Condition
 from .growth import Growth, growths
-from .optimizers import Minimum, Observer, Progress, judged, minimize, named
+from .optimizers import minimize, named
 from .problem import FitProblem
+from .progress import Minimum, Observer, Progress
 from .race import Course, Raced, groups_of, race
+from .slope import judged
 from .starts import drawn, off_bounds
 from .windows import STEPS, TOLERANCE, along, chosen, cut, holds_frames
 

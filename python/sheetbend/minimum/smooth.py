@@ -21,9 +21,10 @@ from ..experiment.experiment import Experiment
 from ..objects.stiffness_field import StiffnessField
 from ..quantities.parameters import Parameter, Parameters
 from ..statistics.spectral import autocorrelation
-from .optimizers import Observer, walked
+from .optimizers import walked
 from .parts import expanded_to
 from .problem import FitProblem
+from .progress import Observer
 
 FIRST_SIZE, FIRST_LENGTH = 0.5, 0.25  # of ln E; of the extent
 SIZES, LENGTHS = (1e-3, 10.0), (0.1, 10.0)  # that are looked at; lengths of the shortest wave's and of the extent
