@@ -7,8 +7,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from ..errors import RecordingError
-from .held import gripping, parts
-from .rope import between_grips
+from .held import between_grips, gripping, parts
 from .take import Description, Measured, Take
 from .text import joined, table
 

@@ -313,3 +313,10 @@ def _direction_stays(x: Array, order: tuple[int, ...]) -> tuple[bool, Array]:
     mean = ways.mean(axis=0)
     spread = [float(np.sqrt(v.var(axis=0).sum())) for v in (ways, chord)]
     return spread[0] < STIFF * spread[1], mean / max(float(np.linalg.norm(mean)), 1e-12)
+
+
+def between_grips(s: Seen) -> bool:
+    """Whether two or more markers hold a rope at each end."""
+    _, order = parts(s)
+    held_by = gripping(s) - set(s.still)
+    return len(order) >= 7 and {*order[:2], *order[-2:]} <= held_by
