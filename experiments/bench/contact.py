@@ -26,7 +26,7 @@ def rope(case: str) -> sb.Scene:
     line = np.stack([0.002 * np.sin(15 * y), y, np.full_like(y, height)], axis=1)
     built = sb.add_rope(scene, "rope", segments=50, points=line, density=0.05, EA=1e3, EI=1e-4)
     if case != "without":
-        scene.contact(built, sb.Plane(name="table"), friction=0.3)
+        scene.add_contact(built, sb.Plane(name="table"), friction=0.3)
     return scene
 
 

@@ -117,7 +117,7 @@ def built(s: Springs) -> sb.Scene:
     particles = scene.add_particles(s.start, s.mass, s.velocity)
     scene.add_constraints("distance", s.links, name="springs", compliance=1.0 / s.stiffness, rest=s.rest)
     ball = sb.Sphere(center=(0, 0, 0), radius=s.sphere, name="shape") if s.sphere else sb.Plane(name="shape")
-    scene.contact(
+    scene.add_contact(
         particles,
         ball,
         friction=s.friction,

@@ -42,8 +42,8 @@ def cloth(vertices: int, friction: float) -> sb.Scene:
     x = np.stack([along[:, 0], mesh.vertices[:, 1], along[:, 1] + 0.5 * THICKNESS + 1e-4], axis=1)
     scene = sb.Scene("folded")
     made = sb.add_cloth(scene, mesh, density=0.2, warp=300.0, shear=60.0, bending=2e-6, positions=x)
-    scene.contact(made, sb.Plane(name="table"), friction=0.0, radius=0.5 * THICKNESS)
-    scene.self_contact(made, radius=0.5 * THICKNESS, **({"friction": friction} if friction else {}))
+    scene.add_contact(made, sb.Plane(name="table"), friction=0.0, radius=0.5 * THICKNESS)
+    scene.add_self_contact(made, radius=0.5 * THICKNESS, **({"friction": friction} if friction else {}))
     return scene
 
 

@@ -74,8 +74,8 @@ def scene_of(vertices: int, speed: float, friction: float, wide: int = 0) -> tup
         )
     ]
     scene.drive(cloth.particles[np.concatenate([right, left])], times, np.concatenate(ways, axis=1), "linear")
-    scene.contact(cloth, sb.Plane(name="table"), friction=friction, radius=0.5 * THICKNESS)
-    scene.self_contact(cloth, radius=0.5 * THICKNESS, **({"friction": friction} if friction else {}))
+    scene.add_contact(cloth, sb.Plane(name="table"), friction=friction, radius=0.5 * THICKNESS)
+    scene.add_self_contact(cloth, radius=0.5 * THICKNESS, **({"friction": friction} if friction else {}))
     return scene, mesh, end
 
 

@@ -29,7 +29,7 @@ def open_knot(segments: int, friction: float) -> tuple[sb.Scene, np.ndarray, np.
         scene, points=points, segments=segments, density=0.02, EA=100.0, EI=5e-6, stretch_damping=5e-3,
         bend_damping=5e-3, drag_linear=0.05,
     )  # fmt: skip
-    scene.self_contact(rope, radius=3e-3, friction=friction)
+    scene.add_self_contact(rope, radius=3e-3, friction=friction)
     ends = rope.particles[[0, -1]]
     x = scene.nodes[ends]
     return scene, ends, (x - x.mean(0)) / np.linalg.norm(x - x.mean(0), axis=1)[:, None]

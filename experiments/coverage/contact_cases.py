@@ -49,7 +49,7 @@ def drag(friction: float, EI: float, drag_linear: float) -> tuple[sb.Scene, np.n
     aside, back = smooth(times / 0.4), smooth((times - 0.4) / 0.45)
     path = np.stack([-0.1 * back, 0.12 * aside - 0.24 * back, 0.1 * back], axis=1)
     scene.drive(rope.particles[:1], times, moved(scene.positions[rope.particles[:1]], times, path))
-    scene.contact(rope, sb.Plane(name="table"), friction=friction, radius=0.005, stiffness=STIFFNESS)
+    scene.add_contact(rope, sb.Plane(name="table"), friction=friction, radius=0.005, stiffness=STIFFNESS)
     return scene, times, [sb.on_rope(rope, 0.4 * (k + 1) / 12) for k in range(12)]
 
 
@@ -72,7 +72,7 @@ def drawn(friction: float, bending: float, drag_linear: float) -> tuple[sb.Scene
     grip = cloth.particles[held]
     scene.drive(grip, times, moved(scene.positions[grip], times, path))
     table = sb.Box(center=(-0.25, 0.06, -0.1), size=(0.6, 0.6, 0.2), edge_radius=0.05, name="edge")
-    scene.contact(cloth, table, friction=friction, radius=0.002, stiffness=SOFTNESS)
+    scene.add_contact(cloth, table, friction=friction, radius=0.002, stiffness=SOFTNESS)
     spots = np.array([(x, y) for x in (0.01, 0.07, 0.13, 0.19) for y in (0.005, 0.04, 0.115)])
     return scene, times, list(sb.on_cloth(cloth, spots))
 
@@ -102,7 +102,7 @@ def over(friction: float, EI: float, drag_linear: float) -> tuple[sb.Scene, np.n
     path = np.stack([0.0 * down, 0.3 * down, -down], axis=1)
     scene.drive(rope.particles[:1], times, moved(scene.positions[rope.particles[:1]], times, path))
     post = sb.Capsule(start=(0, -0.5, 0), end=(0, 0.5, 0), radius=RADIUS, name="post")
-    scene.contact(rope, post, friction=friction, radius=ROPE_RADIUS, stiffness=STIFFNESS)
+    scene.add_contact(rope, post, friction=friction, radius=ROPE_RADIUS, stiffness=STIFFNESS)
     return scene, times, [sb.on_rope(rope, rope.length * (k + 1) / 12) for k in range(12)]
 
 

@@ -121,7 +121,7 @@ def scene_of(toss: Toss, height: float = 0.0) -> sb.Scene:
     table = sb.Plane(name="table", point=(0.0, 0.0, height))
     for body in (first, second):
         name = f"{body.name}_table"
-        scene.contact(body, table, friction=0.2, stiffness=STIFFNESS, dissipation=2.0, points=TOUCHING, name=name)
+        scene.add_contact(body, table, friction=0.2, stiffness=STIFFNESS, dissipation=2.0, points=TOUCHING, name=name)
     scene.add_quantity("rounding", 0.0, "m", positive=False, scale=2e-3, limits=(0.0, 0.02))
     scene.add_quantity("stretch", 0.0, "", positive=False, scale=0.01)
     axes = np.arange(4 * 2 * len(TOUCHING)).reshape(-1, 4)[:, 1:].ravel()  # of the weights of the corners' nodes

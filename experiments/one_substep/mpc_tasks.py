@@ -85,7 +85,7 @@ class Towel:
         corners = tuple(int(cloth.particles[k]) for k in (0, -1, cells, -1 - cells))
         scene.add_force(corners[:1], np.zeros((1, 1, 3)))
         table = sb.Plane(name="table", point=(0.0, 0.0, -0.002))
-        scene.contact(cloth, table, friction=0.5, radius=0.002)
+        scene.add_contact(cloth, table, friction=0.5, radius=0.002)
         return Towel(Stepper(scene, sb.Solver(h=1 / 60, method="implicit")), corners)
 
     def start(self) -> Now:

@@ -38,9 +38,9 @@ def on_ropes() -> tuple[Control, int]:
     line = [(0.0, -HALF, 0.0), (0.0, HALF, 0.0)]
     table, ropes = sb.Plane(name="table"), list(scene.ropes.values())
     free = np.concatenate([rope.particles[1:-1] for rope in ropes])
-    scene.contact(free, table, friction=FRICTION, radius=RADIUS, name="ropes")
-    scene.contact(bar, table, friction=FRICTION, radius=BAR, points=line, name="ends")
-    scene.self_contact(*ropes, bar.capsules([line]), radius=[RADIUS, RADIUS, BAR], friction=FRICTION)
+    scene.add_contact(free, table, friction=FRICTION, radius=RADIUS, name="ropes")
+    scene.add_contact(bar, table, friction=FRICTION, radius=BAR, points=line, name="ends")
+    scene.add_self_contact(*ropes, bar.capsules([line]), radius=[RADIUS, RADIUS, BAR], friction=FRICTION)
     hands = {"first": [rope.particles[0] for rope in ropes], "second": [rope.particles[-1] for rope in ropes]}
     held = [int(p) for ends in hands.values() for p in ends]
     times = np.arange(round(MOVING * RATE) + 1) / RATE

@@ -33,10 +33,10 @@ def on_table(name: str, points: Array, posts: Sequence[tuple[float, float, float
     rope = sb.add_rope(
         scene, segments=SEGMENTS, points=line, density=0.05, EA=500.0, EI=2e-4, bend_damping=0.02, stretch_damping=1e-3
     )
-    scene.contact(rope, sb.Plane(name="table"), friction=FRICTION, radius=RADIUS)
+    scene.add_contact(rope, sb.Plane(name="table"), friction=FRICTION, radius=RADIUS)
     for k, (x, y, radius) in enumerate(posts):
         post = sb.Capsule(start=(x, y, -0.2), end=(x, y, 0.2), radius=radius, name=f"post_{k + 1}")
-        scene.contact(rope, post, friction=FRICTION, radius=RADIUS)
+        scene.add_contact(rope, post, friction=FRICTION, radius=RADIUS)
     hand = int(rope.particles[-1])
     times = np.arange(round(MOVING * RATE) + 1) / RATE
     scene.drive([hand], times, np.broadcast_to(scene.nodes[hand], (len(times), 1, 3)))

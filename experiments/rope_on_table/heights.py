@@ -31,7 +31,7 @@ def falling(height: float) -> tuple[sb.Scene, Array]:
     )
     rope = scene.ropes["rope"].particles
     scene._velocities.values[rope] = (0.3, 0.1, 0.0)
-    scene.contact(rope, sb.Plane(name="table"), friction=0.3, radius=0.004)
+    scene.add_contact(rope, sb.Plane(name="table"), friction=0.3, radius=0.004)
     return scene, rope
 
 

@@ -90,7 +90,7 @@ def scene_of(toss: Toss, seen: int, restitution: float | None = None) -> sb.Scen
     soft = {"stiffness": STIFFNESS, "dissipation": FROM["table_contact_dissipation"]}
     law = soft if restitution is None else {"restitution": restitution}
     friction = AUTHORS["table_friction"]
-    scene.contact(cube, sb.Plane(name="table"), friction=friction, points=CORNERS, settle=True, **law)
+    scene.add_contact(cube, sb.Plane(name="table"), friction=friction, points=CORNERS, settle=True, **law)
     scene.add_quantity("rounding", 0.0, "m", positive=False, scale=2e-3, limits=(0.0, 0.02))
     scene.add_quantity("stretch", 0.0, "", positive=False, scale=0.01)
     axes = np.arange(4 * len(CORNERS)).reshape(-1, 4)[:, 1:].ravel()  # of the weights of the corners' nodes

@@ -72,6 +72,7 @@ from .recording.io.folder import read_recordings
 from .recording.of_poses import start_of_poses
 from .recording.recording import Recording
 from .report.fit_result import FitResult
+from .report.many import ManyFit
 from .report.scores import Score, Scores, coordinate_error, scores
 from .scene.body import Body
 from .scene.body_points import box_corners
@@ -129,6 +130,7 @@ __all__ = [
     "Joint",
     "Junction",
     "LockingWarning",
+    "ManyFit",
     "MeshError",
     "NoEquilibriumError",
     "Orthotropic",

@@ -1,4 +1,4 @@
-"""Old names of modules, for one version: importing from them warns, and pickles that name them load.
+"""Old names of modules, functions and methods, for one version: what uses them warns, and pickles that name them load.
 
 Until version 0.2. Names of `sheetbend` itself and of its packages mesh, textile, gripped, torch and config never moved;
 they are what users import from.
@@ -96,6 +96,21 @@ class _Moved(ModuleType):
         if name.startswith("__"):
             raise AttributeError(name)
         return _found(self.__name__, self._new, name)
+
+
+class OldMethod:
+    """An old name of a method, as an attribute of its class: using it warns, and gives the method of the new name."""
+
+    def __init__(self, now: str) -> None:
+        self._now = now
+
+    def __set_name__(self, _: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, instance: Any, owner: type) -> Any:
+        message = f"{owner.__name__}.{self._name} goes in version 0.2: use {owner.__name__}.{self._now}"
+        warnings.warn(message, DeprecationWarning, stacklevel=2)
+        return getattr(owner if instance is None else instance, self._now)
 
 
 def keep_old_modules() -> None:

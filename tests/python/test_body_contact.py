@@ -17,7 +17,7 @@ def tossed(touches: bool = True, **contact) -> tuple[sb.Scene, sb.Body]:
     body = scene.add_body("cube", of=sb.Inertia.box(0.37, SIDES), **start)
     if touches:
         options = {"friction": 0.2, "points": sb.box_corners(SIDES)} | contact
-        scene.contact(body, sb.Plane(name="table"), **options)
+        scene.add_contact(body, sb.Plane(name="table"), **options)
     return scene, body
 
 
@@ -64,8 +64,8 @@ def test_a_plug_on_a_cable_rests_on_a_table():
     stencil = [[plug.particles[0], rope.particles[-1], *plug.particles[1:]]]
     scene.add_constraints("coincide_particle", stencil, name="hold", compliance=0.0, rest=[[-0.015, 0, 0]])
     table = sb.Plane(name="table")
-    scene.contact(rope, table, friction=0.3, radius=0.004, name="cable")
-    scene.contact(plug, table, friction=0.3, points=sb.box_corners((0.03, 0.01, 0.01)), name="plug_on_table")
+    scene.add_contact(rope, table, friction=0.3, radius=0.004, name="cable")
+    scene.add_contact(plug, table, friction=0.3, points=sb.box_corners((0.03, 0.01, 0.01)), name="plug_on_table")
     motion = sb.simulate(scene, [0.0, 0.5], SOLVER)
     place, axes = plug.pose(motion)
     assert place[-1, 2] == pytest.approx(0.005, abs=1e-6)
@@ -99,7 +99,7 @@ def test_a_free_body_bounces_with_its_restitution(integrator, off):
     scene = sb.Scene("box")
     sides = (0.1, 0.1, 0.1)
     box = scene.add_body("box", of=sb.Inertia.box(0.1, sides), at=(0, 0, 0.3))
-    scene.contact(box, sb.Plane(name="table"), friction=0.1, restitution=0.5, points=sb.box_corners(sides))
+    scene.add_contact(box, sb.Plane(name="table"), friction=0.1, restitution=0.5, points=sb.box_corners(sides))
     fall = np.sqrt(2 * 0.25 / 9.81)
     solver = sb.Solver(h=1 / 960, method="implicit", integrator=integrator)
     for e in (0.5, 0.8):
@@ -115,7 +115,7 @@ def test_settle_moves_a_body_as_a_whole_out_of_all_shapes():
     turned = body.pose(scene.nodes)[1]
     points = sb.box_corners(SIDES)
     for name, normal in (("floor", (0, 0, 1)), ("wall", (1, 0, 0))):
-        scene.contact(body, sb.Plane(normal=normal, name=name), friction=0.1, points=points, settle=True)
+        scene.add_contact(body, sb.Plane(normal=normal, name=name), friction=0.1, points=points, settle=True)
     motion = sb.simulate(scene, [0.0, 2e-3], SOLVER)
     place, axes = body.pose(motion)
     assert place[0] == pytest.approx([(turned @ points.T)[0].max(), 0, 0.06], abs=1e-12)
@@ -130,7 +130,7 @@ def test_settle_moves_no_body_that_something_holds():
     scene = sb.Scene("door")
     door = scene.add_body("door", of=sb.Inertia.box(0.37, SIDES), at=(0, 0, 0.05))
     sb.hinge(None, door, at=(0.05, 0, 0), axis=(0, 1, 0))
-    scene.contact(door, sb.Plane(name="table"), friction=0.2, points=sb.box_corners(SIDES), settle=True)
+    scene.add_contact(door, sb.Plane(name="table"), friction=0.2, points=sb.box_corners(SIDES), settle=True)
     with pytest.raises(sb.SceneError, match="joined to nothing: 'door' is held by 'hinge_"):
         scene.compiled  # noqa: B018
 
@@ -138,4 +138,4 @@ def test_settle_moves_no_body_that_something_holds():
 def test_particles_have_no_points():
     scene = sb.rope(0.2, 8, density=0.05, EA=200.0, EI=1e-4, start=(0, 0, 0.1))
     with pytest.raises(sb.SceneError, match="no body"):
-        scene.contact(scene.ropes["rope"], sb.Plane(name="table"), friction=0.1, points=[[0, 0, 0]])
+        scene.add_contact(scene.ropes["rope"], sb.Plane(name="table"), friction=0.1, points=[[0, 0, 0]])

@@ -25,7 +25,7 @@ def bar_on_ropes(height: float = 0.0151, friction: float = 0.0, speed: float = 0
         scene.pin(rope.particles[[0, -1]])
     bar = scene.add_body("bar", of=BAR, at=(0.01, 0.0, height), velocity=(0.0, 0.0, -speed))
     pieces = [*scene.ropes.values(), bar.capsules(LINE)]
-    scene.self_contact(*pieces, radius=[0.005, 0.005, 0.01], friction=friction, pairs=8)
+    scene.add_self_contact(*pieces, radius=[0.005, 0.005, 0.01], friction=friction, pairs=8)
     return scene
 
 
@@ -59,7 +59,7 @@ def test_a_bar_lies_on_a_cloth_and_on_another_bar():
     for k, turn in enumerate([(0, 0, 0.1, 1), (0, 0, 1, 1)]):
         bar = scene.add_body(f"bar{k}", of=BAR, at=(0.1, 0.1, 0.0115 + 0.0205 * k), rotation=turn)
         pieces.append(bar.capsules([[0.0, -0.05, 0.0], [0.0, 0.05, 0.0]]))
-    scene.self_contact(cloth, *pieces, radius=[0.001, 0.01, 0.01])
+    scene.add_self_contact(cloth, *pieces, radius=[0.001, 0.01, 0.01])
     motion = sb.simulate(scene, np.linspace(0.0, 0.1, 6), SOLVER)
     low, high = (scene.bodies[f"bar{k}"].pose(motion)[0][:, 2] for k in range(2))
     assert (high - low).min() > 0.02 - 1e-5
@@ -99,11 +99,11 @@ def test_what_cannot_be_is_refused():
             bar.capsules(ends)
         assert error.value.field == "bar.capsules"
     with pytest.raises(sb.SceneError, match="must be positive"):
-        scene.self_contact(bar.capsules(LINE), radius=-0.01)
+        scene.add_self_contact(bar.capsules(LINE), radius=-0.01)
     with pytest.raises(sb.SceneError, match=r"capsules"):
-        scene.self_contact(bar, radius=0.01)
+        scene.add_self_contact(bar, radius=0.01)
     with pytest.raises(sb.SceneError, match="capsules of the scene"):
-        sb.Scene("other").self_contact(bar.capsules(LINE), radius=0.01)
+        sb.Scene("other").add_self_contact(bar.capsules(LINE), radius=0.01)
     deep = bar_on_ropes(height=0.013)
     with pytest.raises(sb.SceneError, match=r"0\.00199 m too near to itself, at .*the body 'bar'"):
         sb.simulate(deep, 0.01, SOLVER)

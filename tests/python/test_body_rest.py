@@ -18,7 +18,7 @@ def box_on_a_slope(degrees: float, friction: float, stiffness: float | None = No
     start = {"at": (0.5 * SIDES[2] + above) * normal, "rotation": (0.0, angle, 0.0)}
     box = scene.add_body("box", of=sb.Inertia.box(MASS, SIDES), **start)
     table = sb.Plane(normal=normal, name="table")
-    scene.contact(box, table, friction=friction, stiffness=stiffness, points=sb.box_corners(SIDES))
+    scene.add_contact(box, table, friction=friction, stiffness=stiffness, points=sb.box_corners(SIDES))
     return scene, box
 
 
@@ -106,7 +106,7 @@ def test_a_box_that_was_tossed_stays_where_it_came_to_rest():
     scene = sb.Scene("toss")
     start = {"at": (0, 0, 0.2), "velocity": (0.8, 0.1, -0.5), "spin": (1, -3, 2)}
     box = scene.add_body("box", of=sb.Inertia.box(MASS, SIDES), **start)
-    scene.contact(box, sb.Plane(name="table"), friction=0.2, points=sb.box_corners(SIDES))
+    scene.add_contact(box, sb.Plane(name="table"), friction=0.2, points=sb.box_corners(SIDES))
     motion = sb.simulate(scene, [0.0, 1.2], sb.Solver(h=2e-3, method="implicit", integrator="bdf1"))
     rest = sb.equilibrium(scene, motion.nodes[-1])
     assert np.abs(box.pose(rest.nodes)[0] - box.pose(motion)[0][-1]).max() < 1e-7
@@ -125,7 +125,7 @@ def test_a_plate_lies_with_one_edge_on_a_table_and_hangs_by_the_other():
         stencil = [[plate.particles[0], hung.particles[-1], *plate.particles[1:]]]
         scene.add_constraints("coincide_particle", stencil, name=f"{name}_knot", compliance=0.0, rest=[place])
     feet = [[-0.15, y, -0.005] for y in (-0.1, 0.1)]
-    scene.contact(plate, sb.Plane(name="table"), friction=0.4, points=feet)
+    scene.add_contact(plate, sb.Plane(name="table"), friction=0.4, points=feet)
     rest = sb.equilibrium(scene)
     weight = MASS * G / 4 + 1e-3 * G * np.array([0.35, 0.25, 0.15, 0.05])  # and that of the rope below the link
     for name in ("left", "right"):

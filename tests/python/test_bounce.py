@@ -14,7 +14,7 @@ SOLVER = sb.Solver(h=1 / 480, method="implicit")
 def ball(restitution=0.8, height=1.0, speed=(0.0, 0.0, 0.0), friction=0.1, **contact) -> sb.Scene:
     scene = sb.Scene("ball")
     scene.add_particles([[0.0, 0.0, height]], 0.1, [speed])
-    scene.contact([0], sb.Plane(name="table"), friction=friction, restitution=restitution, **contact)
+    scene.add_contact([0], sb.Plane(name="table"), friction=friction, restitution=restitution, **contact)
     return scene
 
 
@@ -31,7 +31,7 @@ def test_a_ball_rises_as_its_restitution_says():
 def test_its_gradients_are_those_of_differences(integrator):
     solver = sb.Solver(h=1 / 240, method="implicit", integrator=integrator)
     scene = ball(speed=(2.0, 0.0, -1.0), height=0.3, radius=0.02)
-    scene.contact([0], sb.Sphere(center=(0.75, 0.0, 0.1), radius=0.15, name="post"), friction=0.2, restitution=0.6)
+    scene.add_contact([0], sb.Sphere(center=(0.75, 0.0, 0.1), radius=0.15, name="post"), friction=0.2, restitution=0.6)
     times = [0.0, 0.4]
     rollout = sb.rollout(scene, times, solver)
     bar = np.zeros_like(rollout.positions)
@@ -84,7 +84,9 @@ def test_a_bounce_is_a_contact_that_begins_and_ends():
 
 def dropped_rope(height: float, **contact: float) -> sb.Scene:
     scene = sb.rope(0.2, 8, density=0.05, EA=200.0, EI=1e-4, start=(0, 0, height), pinned=())
-    scene.contact(scene.ropes["rope"], sb.Plane(name="table"), friction=0.3, radius=0.005, restitution=0.5, **contact)
+    scene.add_contact(
+        scene.ropes["rope"], sb.Plane(name="table"), friction=0.3, radius=0.005, restitution=0.5, **contact
+    )
     return scene
 
 
@@ -121,7 +123,7 @@ def test_plain_gradient_descent_throws_a_ball_by_floor_and_wall_into_a_target():
         scene.add_particles([[-0.5, 0.0, 1.0]], 1.0, [velocity])
         for name, point, normal in (("floor", (0, 0, 0), (0, 0, 1)), ("wall", (1.75, 0, 0), (-1, 0, 0))):
             plane = sb.Plane(point=point, normal=normal, name=name)
-            scene.contact([0], plane, friction=0.1, restitution=0.92, radius=0.1)
+            scene.add_contact([0], plane, friction=0.1, restitution=0.92, radius=0.1)
         return sb.rollout(scene, [0.0, 0.6], solver)
 
     losses = []

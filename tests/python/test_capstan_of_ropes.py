@@ -33,7 +33,7 @@ def over_a_taut_rope(links: int, friction: float) -> sb.Scene:
     scene.pin(post.particles[[0, -1]])
     count = len(points) - 1
     rope = sb.add_rope(scene, "rope", points=points, length=count * link, segments=count, density=0.05, EA=EA, EI=1e-9)
-    scene.self_contact(post, rope, radius=[POST, ROPE], friction=friction)
+    scene.add_self_contact(post, rope, radius=[POST, ROPE], friction=friction)
     scene.add_force(rope.particles[:1], [[[0.0, 0.0, -LOAD]]])
     path = scene.positions[rope.particles[-1]] - np.outer([0.0, 1e-3, 8e-3], (0.0, 0.0, 1.0))
     scene.drive(rope.particles[-1:], [0.0, 0.02, 0.16], path[:, None], "linear")

@@ -27,7 +27,7 @@ def scene() -> sb.Scene:
         sb.Cylinder(start=(0.2, 0, 0.02), end=(0.2, 0, 0.05), radius=0.03, edge_radius=0.004, name="plate"),
         sb.Box(center=(0.3, 0, 0.03), size=(0.06, 0.04, 0.02), edge_radius=0.005, name="box"),
     ):
-        made.contact(rope, shape, friction=0.3, radius=0.002)
+        made.add_contact(rope, shape, friction=0.3, radius=0.002)
     return made
 
 

@@ -71,7 +71,7 @@ def in_python(**contact) -> tuple[sb.Scene, sb.Body]:
     body = scene.add_body("box", of=inertia, at=(0.0, 0.0, 0.03), velocity=(0.6, 0.0, 0.0))
     sb.add_rope(scene, "cord", length=0.1, segments=4, density=0.05, EA=1e3, EI=1e-4, start=(1.0, 0.0, 0.3))
     options = {"friction": 0.2, "points": sb.box_corners(SIDES, CENTER)} | contact
-    scene.contact(body, sb.Plane(name="table"), **options)
+    scene.add_contact(body, sb.Plane(name="table"), **options)
     return scene, body
 
 

@@ -71,9 +71,9 @@ def built(text: str) -> sb.Scene:
 def test_a_file_builds_the_scene_that_python_builds():
     scene = sb.Scene("dragged", (0, 0, -9.81))
     rope = sb.add_rope(scene, length=0.2, segments=8, density=0.05, EA=200.0, EI=1e-4, start=(0, 0, 0.005))
-    scene.contact(rope, sb.Plane(name="table"), friction=0.3, radius=0.005)
+    scene.add_contact(rope, sb.Plane(name="table"), friction=0.3, radius=0.005)
     post = sb.Capsule(start=(0.1, 0.1, 0), end=(0.1, 0.1, 0.3), radius=0.02, name="post")
-    scene.contact(rope, post, friction=0.2, stiffness=500.0)
+    scene.add_contact(rope, post, friction=0.2, stiffness=500.0)
     read, solver = scene_alone(parsed(DRAGGED))
     assert {n: q.value for n, q in read.quantities.items()} == {n: q.value for n, q in scene.quantities.items()}
     assert {"table_friction", "table_contact_radius", "post_contact_stiffness", "post_radius"} <= set(read.quantities)

@@ -15,7 +15,7 @@ TIMES = [0.0, 0.05, 0.1]
 def rope_above(height=0.006, pinned=(), **contact) -> sb.Scene:
     scene = sb.rope(0.2, 8, density=0.05, EA=200.0, EI=1e-4, start=(0, 0, height), pinned=pinned)
     options = {"friction": 0.3, "radius": 0.005} | contact
-    scene.contact(scene.ropes["rope"], sb.Plane(name="table"), **options)
+    scene.add_contact(scene.ropes["rope"], sb.Plane(name="table"), **options)
     return scene
 
 
@@ -92,7 +92,7 @@ def test_a_moving_bar_lifts_a_cloth():
     side = np.array([0.0, 0.2, 0.0])
     bar = sb.Capsule(start=middle - side - [0, 0, 0.03], end=middle + side - [0, 0, 0.03], radius=0.025, name="bar")
     up = bar.moving([0.0, 0.1, 0.3], [[0, 0, 0], [0, 0, 0], [0, 0, 0.05]])
-    scene.contact(cloth, up, friction=0.5, radius=1e-3)
+    scene.add_contact(cloth, up, friction=0.5, radius=1e-3)
     end = sb.simulate(scene, [0.0, 0.3], SOLVER).positions[-1, cloth.particles]
     assert end[:, 2].max() == pytest.approx(middle[2] - 0.03 + 0.05 + 0.026, abs=2e-3)
     assert end[:, 2].min() < middle[2]
@@ -105,7 +105,7 @@ def test_a_turned_plane_keeps_its_normal():
     assert angles[0] == pytest.approx(np.pi / 4)
     scene = sb.Scene("turning", gravity=(0, 0, 0))
     scene.add_particles([[0.0, 0.0, 1.0]], 0.1)
-    scene.contact([0], turned, friction=0.0)
+    scene.add_contact([0], turned, friction=0.0)
     gaps = scene.compiled.core.contact_gaps(scene.compiled.inputs(), 1.0, 0)
     assert gaps[0, 1:] == pytest.approx([-np.sqrt(0.5), 0.0, np.sqrt(0.5)])
 
@@ -146,9 +146,9 @@ def test_shapes_refuse_what_they_cannot_be():
             build()
     scene = rope_above()
     with pytest.raises(sb.SceneError, match="is no shape"):
-        scene.contact([0], "table", friction=0.1)
+        scene.add_contact([0], "table", friction=0.1)
     with pytest.raises(sb.SceneError, match="taken"):
-        scene.contact([0], sb.Plane(name="table"), friction=0.1)
+        scene.add_contact([0], sb.Plane(name="table"), friction=0.1)
 
 
 @pytest.mark.parametrize("method", ["direct", "newton", "newton_cg"])

@@ -21,7 +21,7 @@ def test_a_chain_slides_off_a_table_and_leaves_its_edge_once_half_of_it_hangs():
         points=np.column_stack([x, 0.0 * x, z]), segments=segments, density=0.05, EA=1e4, EI=1e-9, pinned=()
     )
     table = sb.Box(center=(edge - 2.0, 0, -2.0 - radius), size=(4, 2, 4), edge_radius=edge, name="table")
-    scene.contact(scene.ropes["rope"], table, friction=0.0, radius=radius, settle=True)
+    scene.add_contact(scene.ropes["rope"], table, friction=0.0, radius=radius, settle=True)
     times, solver = np.array([0.0, 0.5, 0.732, 0.85]), sb.Solver(h=1e-3, method="implicit")
     motion = sb.simulate(scene, times, solver)
     told = drop * np.cosh(times * np.sqrt(G))
@@ -40,7 +40,7 @@ def test_a_particle_that_is_drawn_around_a_post_leaves_it_at_its_side():
     scene = sb.Scene("drawn", gravity=(1.0 / mass, 0, 0))
     scene.add_particles([[np.cos(start), np.sin(start), 0.0]], mass)
     scene.set_drag(linear=[1.0])
-    scene.contact([0], sb.Capsule(start=(0, 0, -1), end=(0, 0, 1), radius=1.0, name="post"), friction=0.0)
+    scene.add_contact([0], sb.Capsule(start=(0, 0, -1), end=(0, 0, 1), radius=1.0, name="post"), friction=0.0)
     rollout = sb.rollout(scene, [0.0, 2.0], sb.Solver(h=2e-3, method="implicit", integrator="bdf1"))
     assert rollout.positions[1, 0] == pytest.approx([2.0 - np.log(np.tan(start / 2)), 1.0, 0.0], abs=2e-3)
     seed = np.zeros_like(rollout.positions)
@@ -54,7 +54,7 @@ def test_a_block_slides_down_an_incline_as_coulomb_says(method: str):
     """x = g (sin a - mu cos a) t^2/2, which N substeps of backward Euler make larger by a share of 1/N."""
     slope, friction, h, steps = np.radians(30.0), 0.3, 1e-3, 1000
     scene = sb.Scene("incline", gravity=(G * np.sin(slope), 0, -G * np.cos(slope)))
-    scene.contact(scene.add_particles([[0, 0, 0]], 0.2), sb.Plane(name="table"), friction=friction)
+    scene.add_contact(scene.add_particles([[0, 0, 0]], 0.2), sb.Plane(name="table"), friction=friction)
     solver = sb.Solver(h=h, method=method, integrator="bdf1", iterations=100 if method == "implicit" else 1)
     rollout = sb.rollout(scene, [0.0, steps * h], solver)
     half = 0.5 * h**2 * steps * (steps + 1)

@@ -16,7 +16,7 @@ def ball(loss: float | None = LOSS, speed: float = SPEED, gravity: float = 0.0, 
     scene = sb.Scene("ball", gravity=(0.0, 0.0, -gravity))
     scene.add_particles([[0.0, 0.0, 0.015]], MASS, [[0.0, 0.0, -speed]])
     given = {"friction": 0.0, "stiffness": STIFFNESS, "dissipation": loss} | contact
-    scene.contact([0], sb.Plane(name="table"), **given)
+    scene.add_contact([0], sb.Plane(name="table"), **given)
     return scene
 
 
@@ -69,7 +69,7 @@ def test_gradients_of_a_body_that_tumbles_agree_with_complex_steps():
     start = {"at": (0.0, 0.0, 0.14), "velocity": (0.8, 0.1, -1.0), "spin": (2.0, -3.0, 1.0)}
     box = scene.add_body("box", of=sb.Inertia.box(0.3, sides), **start)
     points = sb.box_corners(sides)
-    scene.contact(box, sb.Plane(name="table"), friction=0.2, stiffness=8e3, dissipation=0.8, points=points)
+    scene.add_contact(box, sb.Plane(name="table"), friction=0.2, stiffness=8e3, dissipation=0.8, points=points)
     checked = sb.check_gradients(scene, [0.0, 0.05, 0.1], sb.Solver(h=1e-3, method="implicit"))
     assert checked.passed, checked
     row = next(r for r in checked.rows if r.name == "table_contact_dissipation")

@@ -22,7 +22,7 @@ def dragged(friction: float, aside: float = 0.15, slope: float = 0.0, depth: flo
     path[:, 0, 1] = aside * share**2 * (3 - 2 * share)
     if aside:
         scene.drive(rope.particles[:1], TIMES, scene.positions[rope.particles[:1]] + path)
-    scene.contact(rope, sb.Plane((0, 0, -depth), (0, slope, 1), name="table"), friction=friction, radius=0.005)
+    scene.add_contact(rope, sb.Plane((0, 0, -depth), (0, slope, 1), name="table"), friction=friction, radius=0.005)
     return scene
 
 
@@ -122,7 +122,7 @@ def test_slides_and_sticks_are_those_of_a_block_on_a_slope(integrator: str) -> N
         scene = sb.Scene("block")
         (block,) = scene.add_particles([[0.0, 0.0, 0.0]], 0.1)
         plane = sb.Plane(normal=(0.0, -0.2, 1.0), name="slope")
-        scene.contact([block], plane, friction=friction)
+        scene.add_contact([block], plane, friction=friction)
         scene.set_drag(linear=[1e-3])
         motion = sb.simulate(scene, np.linspace(0.0, 0.2, 11), replace(SOLVER, integrator=integrator))
         modes = motion.contact_modes["slope"]

@@ -19,7 +19,7 @@ def particle_on_a_slope(
     scene.add_particles([[0.0, 0.0, 0.0], 0.1 * along], [1.0, 0.2])
     scene.pin([0])
     scene.add_constraints("distance", [[0, 1]], name="spring", compliance=1 / spring, rest=[0.1])
-    scene.contact([1], sb.Plane(normal=normal, name="slope"), friction=friction, stiffness=stiffness)
+    scene.add_contact([1], sb.Plane(normal=normal, name="slope"), friction=friction, stiffness=stiffness)
     return scene
 
 
@@ -75,7 +75,7 @@ def rope_over_a_bar(friction: float = 0.2) -> sb.Scene:
     lengths = np.linalg.norm(np.diff(scene.positions, axis=0), axis=1)
     scene.add_constraints("distance", pairs, name="rope", compliance=lengths / 200.0, rest=lengths)
     bar = sb.Capsule(start=(0, -0.3, 0), end=(0, 0.3, 0), radius=0.05, name="bar")
-    scene.contact(np.arange(1, 26), bar, friction=friction, radius=0.0005)
+    scene.add_contact(np.arange(1, 26), bar, friction=friction, radius=0.0005)
     return scene
 
 
@@ -122,7 +122,7 @@ def cloth_on_a_ball() -> sb.Scene:
     middle = scene.positions.mean(axis=0)
     ball = sb.Sphere(center=middle - [0.006, 0.004, 0.0521], radius=0.05, name="ball")
     scene.set_drag(linear=np.full(scene.particle_count, 5e-4))
-    scene.contact(scene.cloths["cloth"], ball, friction=0.3, radius=0.002, stiffness=2e3)
+    scene.add_contact(scene.cloths["cloth"], ball, friction=0.3, radius=0.002, stiffness=2e3)
     return scene
 
 

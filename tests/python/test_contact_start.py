@@ -17,7 +17,7 @@ def on_table(settle: bool, deep: float = 1e-3) -> sb.Scene:
     rope = scene.ropes["rope"]
     for particle, place in zip(rope.particles, points, strict=True):
         scene.shift_base(int(particle), place - scene.positions[particle])
-    scene.contact(rope, sb.Plane(name="table"), friction=0.3, radius=0.005, settle=settle)
+    scene.add_contact(rope, sb.Plane(name="table"), friction=0.3, radius=0.005, settle=settle)
     return scene
 
 
@@ -40,7 +40,7 @@ def test_a_corner_of_two_planes_is_left_on_both() -> None:
     scene = sb.Scene("corner")
     (particle,) = scene.add_particles([[-0.01, 0.0, -0.02]], 0.1)
     for name, normal in (("floor", (0, 0, 1)), ("wall", (1, 0, 0.5))):
-        scene.contact([particle], sb.Plane(normal=normal, name=name), friction=0.1, settle=True)
+        scene.add_contact([particle], sb.Plane(normal=normal, name=name), friction=0.1, settle=True)
     start = sb.simulate(scene, [0.0], SOLVER).positions[0, particle]
     assert start[2] >= -1e-9 and start @ np.array([1, 0, 0.5]) >= -1e-9
 
@@ -65,7 +65,7 @@ def swept(h: float, radius: float = 0.01, interpolation: str = "linear") -> sb.T
     (particle,) = scene.add_particles([[0.0, 0.0, 0.2]], 0.1)
     post = sb.Capsule(start=(-0.2, -1, 0.2), end=(-0.2, 1, 0.2), radius=radius, name="post")
     moving = post.moving([0.0, 0.1], [[0, 0, 0], [0.4, 0, 0]], interpolation=interpolation)
-    scene.contact([particle], moving, friction=0.1, radius=0.002)
+    scene.add_contact([particle], moving, friction=0.1, radius=0.002)
     return sb.simulate(scene, [0.0, 0.06], sb.Solver(h=h, method="implicit", integrator="bdf1"))
 
 
@@ -84,7 +84,7 @@ def test_a_collider_that_is_thicker_than_its_way_in_a_substep_pushes(h: float, r
 def test_a_gradient_is_empty_while_nothing_touches_and_says_so() -> None:
     """A rope that falls on a table: where its end lies does not depend on friction before it has landed and slides."""
     scene = sb.rope(0.2, 8, density=0.05, EA=200.0, EI=1e-4, start=(0, 0, 0.06), pinned=(0,))
-    scene.contact(scene.ropes["rope"], sb.Plane(name="table"), friction=0.3, radius=0.005)
+    scene.add_contact(scene.ropes["rope"], sb.Plane(name="table"), friction=0.3, radius=0.005)
     scales = {"table_friction": 0.1, "table_z": 0.01}
 
     def felt(until: float) -> sb.Gradient:

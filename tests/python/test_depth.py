@@ -29,7 +29,7 @@ def rope(depth: float = 0.0, lift: float = 0.0, stiffness: float | None = None) 
         path[:, :, 2] -= (depth + 1e-3) * ease[:, None]
         scene.drive(hand, TIMES, path)
     table = sb.Plane(name="table").moving(TIMES, lift * ease[:, None] * [0.0, 0.0, 1.0])
-    scene.contact(scene.ropes["rope"], table, friction=0.3, radius=RADIUS, stiffness=stiffness)
+    scene.add_contact(scene.ropes["rope"], table, friction=0.3, radius=RADIUS, stiffness=stiffness)
     return scene
 
 
@@ -94,7 +94,7 @@ def falling_box(h: float) -> tuple[str, ...]:
     sides = (0.1, 0.1, 0.12)
     scene = sb.Scene("toss")
     box = scene.add_body("box", of=sb.Inertia.box(0.4, sides), at=(0, 0, 0.2), velocity=(0.8, 0, -3), spin=(1, -3, 2))
-    scene.contact(box, sb.Plane(name="table"), friction=0.2, points=sb.box_corners(sides))
+    scene.add_contact(box, sb.Plane(name="table"), friction=0.2, points=sb.box_corners(sides))
     return warned(scene, replace(SOLVER, h=h, integrator="bdf2"))
 
 

@@ -81,7 +81,7 @@ def test_a_sphere_and_a_box_come_out_as_far_as_stated(ball: sb.DistanceField):
 
 def draped(shape: sb.Sphere | sb.DistanceField) -> sb.Scene:
     scene = sb.rope(0.2, 20, density=0.05, EA=200.0, EI=1e-5, start=(-0.1, 0, 0.055), pinned=())
-    scene.contact(scene.ropes["rope"], shape, friction=0.4, radius=0.004, name="ball")
+    scene.add_contact(scene.ropes["rope"], shape, friction=0.4, radius=0.004, name="ball")
     return scene
 
 
@@ -125,8 +125,8 @@ def test_what_is_no_solid_is_refused(ball: sb.DistanceField, tmp_path: Path):
     scene = sb.Scene("far")
     scene.add_particles([[0.0, 0.0, 1.0]], 0.1)
     with pytest.raises(sb.SceneError, match="distances are known"):
-        scene.contact([0], ball, friction=0.1, radius=0.1)
-    scene.contact([0], ball, friction=0.1)
+        scene.add_contact([0], ball, friction=0.1, radius=0.1)
+    scene.add_contact([0], ball, friction=0.1)
     with pytest.raises(sb.SceneError, match="scene files do not hold"):
         sb.save_scene(scene, tmp_path / "scene.npz")
 

@@ -137,7 +137,7 @@ def test_numbers_from_the_end_are_refused() -> None:
         lambda: scene.add_constraints("distance", [[0, -1]]),
         lambda: scene.add_force([-1], [0, 0, 1.0]),
         lambda: scene.drive([-1], [0.0], np.zeros((1, 1, 3))),
-        lambda: scene.contact([-1], sb.Plane(), friction=0.1),
+        lambda: scene.add_contact([-1], sb.Plane(), friction=0.1),
         lambda: scene.add_point_mass(-1, 0.1, "weight"),
     ):
         with pytest.raises(sb.SceneError, match=r"particles that do not exist.*use 0 to 1"):

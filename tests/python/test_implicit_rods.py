@@ -73,7 +73,7 @@ def on_a_table(friction: float = 0.3, speed: float = 0.5, **options) -> sb.Scene
     points = np.stack([np.zeros(9), np.linspace(0.0, 0.4, 9), np.full(9, 0.005 + 1e-9)], axis=1)
     along = np.tile([speed, 0.0, 0.0], (9, 1))
     scene = sb.rod(0.4, 8, points=points, velocity=along, director=(0.3, 0.0, 1.0), **given)
-    scene.contact(scene.ropes["rod"], sb.Plane(name="table"), friction=friction, radius=0.005)
+    scene.add_contact(scene.ropes["rod"], sb.Plane(name="table"), friction=friction, radius=0.005)
     return scene
 
 
@@ -104,7 +104,7 @@ def test_a_rod_around_a_bar_multiplies_its_tension():
         scene, length=chord * links, segments=links, density=DENSITY, EI=1e-8, GJ=1e-8, EA=1e4, points=points
     )
     bar = sb.Capsule(start=(0, -1, 0), end=(0, 1, 0), radius=radius, name="bar")
-    scene.contact(rod, bar, friction=mu)
+    scene.add_contact(rod, bar, friction=mu)
     scene.add_force([0], [[[0.0, 0.0, -1.0]]])
     last = links
     times = np.array([0.0, 0.02, 0.1])
@@ -133,7 +133,7 @@ def rolled_over(segments: int = 8) -> tuple[sb.Scene, dict[str, float]]:
         twist_modes=[0],
         bend_damping=0.01,
     )
-    scene.contact(scene.ropes["rod"], sb.Plane(name="table"), friction=0.2, radius=0.005)
+    scene.add_contact(scene.ropes["rod"], sb.Plane(name="table"), friction=0.2, radius=0.005)
     return scene, {"rod_curvature_1_0": 3.0, "rod_curvature_2_0": 4.0, "rod_twist_0": 2.0}
 
 

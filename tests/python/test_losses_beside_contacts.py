@@ -39,7 +39,7 @@ def dragged(
     path = np.zeros((len(TIMES), 1, 3))
     path[:, 0, 1] = 0.15 * share**2 * (3 - 2 * share)
     scene.drive(rope.particles[:1], TIMES, scene.positions[rope.particles[:1]] + path)
-    scene.contact(rope, sb.Plane(name="table"), friction=friction, radius=0.005, restitution=restitution)
+    scene.add_contact(rope, sb.Plane(name="table"), friction=friction, radius=0.005, restitution=restitution)
     return scene
 
 
@@ -58,7 +58,7 @@ def thrown(friction: float = 0.3, EI: float = 1e-4, **losses: Any) -> sb.Scene:
         velocity=along,
         **losses,
     )
-    scene.contact(rope, sb.Plane(name="table"), friction=friction, radius=0.005)
+    scene.add_contact(rope, sb.Plane(name="table"), friction=friction, radius=0.005)
     return scene
 
 
@@ -123,7 +123,7 @@ def test_contacts_with_a_stiffness_get_no_restitution() -> None:
         scene = sb.rope(0.3, 11, density=0.05, EA=200.0, EI=1e-4, start=(0, 0, 0.006), pinned=())
         for k, each in enumerate(stiffness):
             plane = sb.Plane((0, 0, -k), name=f"table {k}")
-            scene.contact(scene.ropes["rope"], plane, friction=0.3, radius=0.005, stiffness=each)
+            scene.add_contact(scene.ropes["rope"], plane, friction=0.3, radius=0.005, stiffness=each)
         return seen(scene, scene, 0)
 
     assert not has_no_bounce(onto(2e4))
@@ -145,7 +145,7 @@ def drawn(warp: float, friction: float, damping: float | None = None) -> tuple[s
     share = np.clip((TIMES - 0.04) / 0.3, 0.0, 1.0)
     path = np.outer(0.15 * share**2 * (3 - 2 * share), (0.0, 1.0, 0.0))[:, None]
     scene.drive(held, TIMES, scene.positions[held] + path)
-    scene.contact(cloth, sb.Plane(name="table"), friction=friction, radius=0.005)
+    scene.add_contact(cloth, sb.Plane(name="table"), friction=friction, radius=0.005)
     return scene, cloth
 
 

@@ -20,7 +20,6 @@ from sheetbend.minimum import blocks
 from sheetbend.minimum.approach import inside
 from sheetbend.minimum.blocks import ManyProblem
 from sheetbend.minimum.problem import FitProblem
-from sheetbend.report.many import ManyFit
 from test_workers import Backwards
 
 COUNT = 20
@@ -53,7 +52,7 @@ def swings(differ: float = 0.0, count: int = COUNT) -> tuple[sb.Experiment, ...]
 
 
 @cache
-def fitted() -> ManyFit:
+def fitted() -> sb.ManyFit:
     return sb.fit_many(swings(), WANTED)
 
 

@@ -151,6 +151,14 @@ def test_a_function_that_is_renamed_is_found_in_its_old_module() -> None:
         _ = sb.nothing
 
 
+@pytest.mark.parametrize("name", ["contact", "self_contact"])
+def test_an_old_method_warns_and_is_the_same(name: str) -> None:
+    scene, now = sb.rope(0.2, 4, density=0.05), f"add_{name}"
+    with pytest.warns(DeprecationWarning, match=f"^Scene.{name} goes in version 0.2: use Scene.{now}$") as told:
+        assert getattr(scene, name) == getattr(scene, now) and getattr(sb.Scene, name) is getattr(sb.Scene, now)
+    assert {one.filename for one in told} == {__file__} and len(told) == 2
+
+
 def names_of(text: str) -> Iterator[str]:
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.ImportFrom) and node.module and not node.level:

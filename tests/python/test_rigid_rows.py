@@ -16,7 +16,7 @@ def stick(friction: float = 0.3) -> sb.Scene:
         [[0, 0, 0.002], [0.1, 0, 0.004], [0.05, 0.08, 0.003]], [0.1, 0.2, 0.15], [[0.5, 0.1, 0.0]] * 3
     )
     scene.add_constraints("distance", [[0, 1], [1, 2], [2, 0]], name="sides", compliance=0.0)
-    scene.contact(particles, sb.Plane(name="table"), friction=friction)
+    scene.add_contact(particles, sb.Plane(name="table"), friction=friction)
     return scene
 
 
@@ -50,7 +50,7 @@ def test_an_inextensible_rope_is_dragged_over_a_table():
     """A rope without EA has rigid links: its pull is that of friction."""
     scene = sb.rope(0.3, 10, density=0.05, start=(0, 0, 0), pinned=())
     scene.drive([0], [0.0, 0.3], [[[0.0, 0.0, 0.0]], [[-0.06, 0.0, 0.0]]], interpolation="linear")
-    scene.contact(scene.ropes["rope"], sb.Plane(name="table"), friction=0.4)
+    scene.add_contact(scene.ropes["rope"], sb.Plane(name="table"), friction=0.4)
     motion = sb.simulate(scene, [0.0, 0.29, 0.3], IMPLICIT)
     tension = motion.forces["rope_stretch"][-1, :, 0]
     weight = 0.05 * 0.3 * 9.81

@@ -53,14 +53,14 @@ def touching() -> sb.Scene:
     scene = sb.rope(0.3, 6, density=0.05, EI=1e-3, EA=50.0, start=(0, 0, 0.009), pinned=())
     rope, table = scene.ropes["rope"], sb.Plane(name="table")
     (loose,) = scene.add_particles([[0.5, 0.0, 0.01]], 0.1, [[0.0, 0.0, -1.0]])
-    scene.contact(rope, table, friction=0.3, radius=0.005)
-    scene.contact([loose], table, friction=0.3, restitution=0.4, name="bounce")
+    scene.add_contact(rope, table, friction=0.3, radius=0.005)
+    scene.add_contact([loose], table, friction=0.3, restitution=0.4, name="bounce")
     ball = sb.Sphere((0.1, 0.0, -0.025), 0.03, name="ball").moving([0.0, 0.1], [[0, 0, 0], [0, 0, 0.01]])
-    scene.contact(rope, ball, friction=0.2, stiffness=1e3, dissipation=0.3)
-    scene.contact(rope.particles[:2], sb.Capsule((0, -1, -0.05), (0, 1, -0.05), 0.02, name="bar"), friction=0.0)
+    scene.add_contact(rope, ball, friction=0.2, stiffness=1e3, dissipation=0.3)
+    scene.add_contact(rope.particles[:2], sb.Capsule((0, -1, -0.05), (0, 1, -0.05), 0.02, name="bar"), friction=0.0)
     plate = sb.Cylinder((0.2, 0, -0.2), (0.2, 0.01, -0.16), 0.05, 0.003, name="plate")
-    scene.contact([4], plate, friction=0.1)
-    scene.contact([3], sb.Box((0.2, 0, -0.06), (0.1, 0.1, 0.1), 0.01, name="box"), friction=0.1)
+    scene.add_contact([4], plate, friction=0.1)
+    scene.add_contact([3], sb.Box((0.2, 0, -0.06), (0.1, 0.1, 0.1), 0.01, name="box"), friction=0.1)
     return scene
 
 

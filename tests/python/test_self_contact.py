@@ -46,7 +46,7 @@ def crossed(height: float = 0.012, **options: object) -> sb.Scene:
 
 def test_two_ropes_rest_across_each_other():
     scene = crossed(stretch_damping=0.02)
-    scene.self_contact(radius=0.005)
+    scene.add_self_contact(radius=0.005)
     motion = sb.simulate(scene, [0.0, 0.5, 1.0, 1.5], SOLVER)
     edges = np.concatenate([np.stack([p[:-1], p[1:]], 1) for p in (r.particles for r in scene.ropes.values())])
     gaps = [nearest(x, edges) - 0.01 for x in motion.positions]
@@ -66,7 +66,7 @@ def test_what_is_driven_may_follow_what_flies_ahead():
     )
     held = [[x, 0, 0] for x in (0.0, 0.05, 0.1)]
     scene.drive(hand.particles[::2], [0.0, 0.1], np.add(held, [[[0, 0, 0]], [[0, 0.1, 0]]]), "linear")
-    scene.self_contact(radius=0.001)
+    scene.add_self_contact(radius=0.001)
     motion = sb.simulate(scene, [0.0, 0.05, 0.1], sb.Solver(h=0.01, method="implicit", integrator="bdf1"))
     assert motion.positions[:, free.particles, 1] == pytest.approx(0.003 + np.tile(motion.times[:, None], 5), abs=1e-12)
 
@@ -80,7 +80,7 @@ def test_momentum_is_kept(friction: float):
             scene, name, points=points, segments=6, density=0.05, EA=200.0, EI=1e-4,
             velocity=np.tile([0.1, v, 0.2], (3, 1)),
         )  # fmt: skip
-    scene.self_contact(radius=[0.004, 0.006], friction=friction)
+    scene.add_self_contact(radius=[0.004, 0.006], friction=friction)
     h = SOLVER.h
     motion = sb.simulate(scene, np.arange(81) * h, SOLVER)
     inputs = scene.compiled.unpack(scene.compiled.inputs())
@@ -105,7 +105,7 @@ def on_a_slope(friction: float) -> sb.Scene:
     scene.pin(held.particles[[0, -1]])
     numbers = {"length": 0.1, "segments": 2, "density": 0.05, "EA": 200.0, "EI": 0.1}
     sb.add_rope(scene, "sliding", start=(0, -0.05, 0.01), direction=(0, 1, 0), **numbers)  # type: ignore[arg-type]
-    scene.self_contact(radius=0.005, friction=friction, pairs=4)
+    scene.add_self_contact(radius=0.005, friction=friction, pairs=4)
     return scene
 
 
@@ -174,8 +174,8 @@ def folded() -> sb.Scene:
         [0.1 - (x[flap, 0] - 0.1) * np.cos(angle), x[flap, 1], (x[flap, 0] - 0.1) * np.sin(angle)], axis=1
     )
     cloth = sb.add_cloth(scene, mesh, density=0.2, warp=200.0, shear=50.0, bending=1e-5, positions=x)
-    scene.contact(cloth, sb.Plane(point=(0, 0, -0.002), name="table"), friction=0.3, radius=0.001)
-    scene.self_contact(cloth, radius=0.001)
+    scene.add_contact(cloth, sb.Plane(point=(0, 0, -0.002), name="table"), friction=0.3, radius=0.001)
+    scene.add_self_contact(cloth, radius=0.001)
     return scene
 
 
@@ -189,7 +189,7 @@ def test_a_cloth_folded_once_lies_on_itself():
 
 def test_the_gradient_is_that_of_differences():
     scene = crossed(height=0.0105)
-    scene.self_contact(radius=[0.005, 0.004])
+    scene.add_self_contact(radius=[0.005, 0.004])
     report = sb.check_gradients(scene, np.linspace(0, 0.05, 3), SOLVER, samples=2)
     assert report.passed, report
     assert {"self_contact_radius_0", "self_contact_radius_1"} <= set(scene.quantities)
@@ -211,15 +211,15 @@ def test_what_cannot_be_is_refused(tmp_path: Path):
     ):
         scene = sb.rope(**rope)
         with pytest.raises(sb.SceneError, match=words):
-            scene.self_contact(radius=radius, friction=friction)
+            scene.add_self_contact(radius=radius, friction=friction)
     scene = crossed(height=0.007)
-    scene.self_contact(radius=0.005)
+    scene.add_self_contact(radius=0.005)
     with pytest.raises(sb.SceneError, match=r"0\.00\d+ m too near"):
         sb.simulate(scene, 0.01, SOLVER)
     scene = crossed()
-    scene.self_contact(radius=0.005)
+    scene.add_self_contact(radius=0.005)
     with pytest.raises(sb.SceneError, match="in one call"):
-        scene.self_contact(radius=0.004)
+        scene.add_self_contact(radius=0.004)
     with pytest.raises(ValueError, match="implicit"):
         sb.simulate(scene, 0.01, sb.Solver(h=1e-3, method="newton"))
     with pytest.raises(sb.SceneError, match="scene files"):
@@ -269,7 +269,7 @@ def test_a_file_builds_what_python_builds(tmp_path: Path):
     path.write_text(TWO)
     read, solver = scene_alone(parse(path))
     scene = crossed()
-    scene.self_contact(radius=0.005)
+    scene.add_self_contact(radius=0.005)
     assert np.array_equal(*(sb.simulate(s, [0.0, 0.1], solver).positions for s in (read, scene)))
     path.write_text(TWO.replace("radius = 0.005", 'of = ["lower", "upper"]\nradius = [0.005, 0.004]\nfriction = 0.3'))
     quantities = scene_alone(parse(path))[0].quantities

@@ -279,7 +279,7 @@ def column(layers: int, pressure: float, gap: float = 0.0) -> tuple[sb.Scene, sb
     solid = sb.add_solid(scene, mesh, "clay", **numbers)
     z = mesh.vertices[:, 2]
     low, top = z < z.min() + 1e-9, z > z.max() - 1e-9
-    scene.contact(solid.particles[low], sb.Plane((0.0, 0.0, float(z.min()) - gap), name="table"), friction=0.0)
+    scene.add_contact(solid.particles[low], sb.Plane((0.0, 0.0, float(z.min()) - gap), name="table"), friction=0.0)
     scene.add_force(solid.particles[top], [[0.0, 0.0, -pressure * 0.02**2 / 4]] * 4)
     return scene, solid, low, top
 

@@ -48,13 +48,13 @@ def tossed() -> sb.Scene:
 def ball() -> sb.Scene:
     scene = sb.Scene("ball")
     scene.add_particles([[0.0, 0.0, 0.03]], 0.1, [[1.0, 0.0, -1.0]])
-    scene.contact([0], sb.Plane(name="table"), friction=0.1, restitution=0.7)
+    scene.add_contact([0], sb.Plane(name="table"), friction=0.1, restitution=0.7)
     return scene
 
 
 def landing() -> sb.Scene:
     scene = sb.rope(0.2, 5, density=0.05, EA=200.0, EI=1e-4, start=(0, 0, 0.006))
-    scene.contact(scene.ropes["rope"], sb.Plane(name="table"), friction=0.3, radius=0.005)
+    scene.add_contact(scene.ropes["rope"], sb.Plane(name="table"), friction=0.3, radius=0.005)
     return scene
 
 

@@ -13,7 +13,7 @@ SLOPE = np.pi / 6
 def block(friction: float, slope: float = 0.0, speed: float = 0.0) -> sb.Scene:
     """A particle on a plane that falls toward +x, at rest or thrown along it."""
     scene = sb.Scene("block", gravity=(9.81 * np.sin(slope), 0.0, -9.81 * np.cos(slope)))
-    scene.contact(scene.add_particles([[0, 0, 0]], 0.3, [[speed, 0, 0]]), sb.Plane(name="table"), friction=friction)
+    scene.add_contact(scene.add_particles([[0, 0, 0]], 0.3, [[speed, 0, 0]]), sb.Plane(name="table"), friction=friction)
     return scene
 
 
@@ -38,7 +38,7 @@ def falling_cloth(**options: float) -> sb.Scene:
     cloth = sb.add_cloth(
         scene, mesh, "cloth", positions=lifted, density=0.2, warp=40.0, shear=10.0, bending=1e-5, **options
     )
-    scene.contact(cloth, sb.Sphere(center=(0, 0, 0), radius=0.1, name="ball"), friction=0.3, radius=0.001)
+    scene.add_contact(cloth, sb.Sphere(center=(0, 0, 0), radius=0.1, name="ball"), friction=0.3, radius=0.001)
     return scene
 
 
@@ -59,10 +59,10 @@ def test_gradients_of_cloth_on_a_ball_hold_against_independent_ones():
 def test_bodies_and_pairs_are_sent_to_implicit():
     scene = sb.Scene("box")
     body = scene.add_body(mass=0.1, inertia=(1e-4,) * 3, at=(0, 0, 0.1), name="box")
-    scene.contact(body, sb.Plane(name="table"), friction=0.3, points=[(0, 0, -0.05)])
+    scene.add_contact(body, sb.Plane(name="table"), friction=0.3, points=[(0, 0, -0.05)])
     with pytest.raises(ValueError, match=r"points of bodies in table.*use implicit"):
         sb.simulate(scene, 0.01, swept(1e-3, 2))
     rope = sb.rope(0.5, 20, density=0.05, EA=100.0, start=(0, 0, 0))
-    rope.self_contact(rope.ropes["rope"], radius=0.004)
+    rope.add_self_contact(rope.ropes["rope"], radius=0.004)
     with pytest.raises(ValueError, match=r"touch each other.*use implicit"):
         sb.simulate(rope, 0.01, swept(1e-3, 2))

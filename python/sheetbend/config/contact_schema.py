@@ -103,10 +103,10 @@ class ColliderSection(Section):
 
 
 class ContactSection(Section):
-    """Who may touch a collider, and how rough that is, `Scene.contact` (docs/contact.md). A list: [[scene.contact]].
-    It needs method = "implicit" or "gauss_seidel" in [solver]. Its quantities are <name>_friction, unless zero
-    <name>_contact_radius (m), and where given <name>_contact_stiffness (N/m), <name>_contact_dissipation (s/m) and
-    <name>_restitution."""
+    """Who may touch a collider, and how rough that is, `Scene.add_contact` (docs/contact.md). A list:
+    [[scene.contact]]. It needs method = "implicit" or "gauss_seidel" in [solver]. Its quantities are <name>_friction,
+    unless zero <name>_contact_radius (m), and where given <name>_contact_stiffness (N/m), <name>_contact_dissipation
+    (s/m) and <name>_restitution."""
 
     name: Name | None = key(None, "prefix of its quantities; the collider's name when left out")
     of: Name | list[Name] = key(
@@ -138,7 +138,7 @@ class ContactSection(Section):
 
 
 class SelfContactSection(Section):
-    """[scene.self_contact]: ropes, cloths and bodies that touch themselves and each other, `Scene.self_contact`
+    """[scene.self_contact]: ropes, cloths and bodies that touch themselves and each other, `Scene.add_self_contact`
     (docs/contact.md). It needs method = "implicit" in [solver]. The radius is the quantity self_contact_radius (m), or
     self_contact_radius_0 and so on where there are several, and the friction is self_friction."""
 

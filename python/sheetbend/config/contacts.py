@@ -76,7 +76,7 @@ def add_contacts(
             continue
         what = scene.bodies[bodies[0].name] if bodies else particles
         with located(path, f"{contact.name or contact.collider}.contact"):
-            scene.contact(what, colliders[contact.collider], name=contact.name, points=points, **numbers)
+            scene.add_contact(what, colliders[contact.collider], name=contact.name, points=points, **numbers)
     _add_self_contact(scene, section)
 
 
@@ -104,7 +104,9 @@ def _add_self_contact(scene: Scene, section: SceneSection) -> None:
     if names:
         with located("scene.self_contact", "self_contact"):
             radius = [radii[n] for n in names] if radii else given.radius
-            scene.self_contact(*(built[n] for n in names), radius=radius, friction=given.friction, pairs=given.pairs)
+            scene.add_self_contact(
+                *(built[n] for n in names), radius=radius, friction=given.friction, pairs=given.pairs
+            )
 
 
 def _points(path: str, contact: ContactSection, bodies: Sequence[BodySection]) -> ArrayLike | None:

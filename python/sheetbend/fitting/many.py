@@ -62,8 +62,7 @@ def fit_many(
             all recordings.
 
     Returns:
-        ManyFit (`sheetbend.report.many`): the shared parameters with intervals, the private ones as a distribution, and
-        a row for each recording.
+        ManyFit: the shared parameters with intervals, the private ones as a distribution, and a row for each recording.
 
     Raises:
         InputError: inputs are inconsistent; the message names them. Raised before work starts.

@@ -127,7 +127,7 @@ class Body:
         return BodyPoint(self, place, way / np.linalg.norm(way))
 
     def capsules(self, ends: ArrayLike) -> BodyCapsules:
-        """Capsules that are part of the body, for `Scene.self_contact`, which gives them their radius.
+        """Capsules that are part of the body, for `Scene.add_self_contact`, which gives them their radius.
 
         Args:
             ends: (n, 2, 3) m, both ends of the middle line of each in the body's frame, or (2, 3) of one. Capsules

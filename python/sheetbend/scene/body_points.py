@@ -17,7 +17,7 @@ Array = np.ndarray
 
 
 def box_corners(sides: ArrayLike, center: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
-    """The corners (8, 3) m of a box along the axes of a body's frame, for `Scene.contact(..., points=...)`.
+    """The corners (8, 3) m of a box along the axes of a body's frame, for `Scene.add_contact(..., points=...)`.
 
     Args:
         sides: (3,) m, whole.
@@ -50,7 +50,7 @@ class BodyPoints:
 
 
 def points_of(what: object, points: ArrayLike | TriangleMesh | None, name: str | None) -> BodyPoints | None:
-    """The points of a body that `Scene.contact` was given, checked; None of anything else.
+    """The points of a body that `Scene.add_contact` was given, checked; None of anything else.
 
     Raises:
         SceneError: points of what is no body, none of a body, shapes, NaN, or two at one place.

@@ -70,7 +70,7 @@ class Contact:
 
 @dataclass(frozen=True)
 class ContactNumbers:
-    """What describes a contact, as `Scene.contact` takes it.
+    """What describes a contact, as `Scene.add_contact` takes it.
 
     Attributes:
         friction: Coulomb's coefficient.
@@ -197,7 +197,7 @@ class Contacts:
         name: str,
         points: BodyPoints | None = None,
     ) -> None:
-        """See `Scene.contact`; `points` are those of a body."""
+        """See `Scene.add_contact`; `points` are those of a body."""
         at, place = len(self.contacts), self._place(scene, collider)
         self._name(scene, f"{name}_friction", "friction", at, numbers.friction, "")
         if numbers.radius > 0:

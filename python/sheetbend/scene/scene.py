@@ -304,7 +304,7 @@ class Scene(SelfTouchingScene):
         self._building()
         self.volumes.add(self, triangles, compliance, rest, name)
 
-    def contact(
+    def add_contact(
         self,
         what: ArrayLike | HasParticles,
         collider: Collider,

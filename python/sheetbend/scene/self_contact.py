@@ -9,6 +9,7 @@ import numpy as np
 
 from ..arrays.checks import is_number
 from ..errors import SceneError
+from ..moved import OldMethod
 from .body import BodyCapsules
 from .held import HeldScene
 from .pieces import PairFriction, Piece
@@ -17,7 +18,7 @@ from .pieces import PairFriction, Piece
 class SelfTouchingScene(HeldScene):
     """A scene under construction whose ropes, cloths and bodies may touch themselves and each other."""
 
-    def self_contact(
+    def add_self_contact(
         self,
         *pieces: Any,
         radius: float | Sequence[float],
@@ -75,6 +76,9 @@ class SelfTouchingScene(HeldScene):
             quantity = self.add_quantity(f"{name}_friction", friction, "")
             carried = self.add_hidden(np.zeros((2 * count, 3)), 1.0, pinned=True)
             self.contacts.pair_friction = PairFriction(name, quantity, carried)
+
+    contact = OldMethod("add_contact")
+    self_contact = OldMethod("add_self_contact")
 
     def _piece(self, piece: Any, radius: float, quantity: str) -> Piece:
         if isinstance(piece, BodyCapsules) and any(piece.body is body for body in self.bodies.values()):

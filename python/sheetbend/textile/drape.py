@@ -151,7 +151,7 @@ def drape_scene(
     for name, low in (("plate", -_THICK), ("cover", 0.0)) if cover else (("plate", -_THICK),):
         start, end = (0.0, 0.0, low), (0.0, 0.0, low + _THICK)
         disk = Cylinder(start=start, end=end, radius=flat + _RIM, edge_radius=_RIM, name=name)
-        scene.contact(touching, disk, friction=friction)
+        scene.add_contact(touching, disk, friction=friction)
     return scene
 
 
