@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -54,14 +55,16 @@ def test_recordings_without_a_name_take_that_of_their_file(tmp_path: Path) -> No
 
 
 def test_a_folder_without_recordings_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(sb.RecordingError, match=r"folder: is no folder .*nowhere"):
-        sb.read_recordings(tmp_path / "nowhere")
+    dataset(tmp_path / "rope", "train/1.pkl", "test/1.pkl")
+    with pytest.raises(sb.RecordingError, match=r"folder: is no folder .*eval.* rope holds test, train"):
+        sb.read_recordings(tmp_path / "rope" / "eval")
+    shutil.rmtree(tmp_path / "rope")
     with pytest.raises(sb.RecordingError, match=r"holds no recording that matches '\*' \(got \[\]\)"):
         sb.read_recordings(tmp_path)
-    dataset(tmp_path, "train/1.pkl")
+    dataset(tmp_path, "train/1.pkl", "eval/1.pkl")
     (tmp_path / "notes.txt").touch()
     with pytest.raises(
-        sb.RecordingError, match=r"got \['notes.txt', 'train/'\]\).*\.npz or \.csv or .*\.c3d or .*\.pkl"
+        sb.RecordingError, match=r"got \['eval/', 'notes.txt', 'train/'\]\).*\.npz or \.csv or .*\.c3d or .*\.pkl"
     ):
         sb.read_recordings(tmp_path)
     with pytest.raises(sb.RecordingError, match=r"matches '\*\.csv' \(got \['1.json', '1.pkl'\]"):
@@ -70,8 +73,6 @@ def test_a_folder_without_recordings_is_refused(tmp_path: Path) -> None:
 
 def test_a_name_that_comes_twice_is_refused(tmp_path: Path) -> None:
     dataset(tmp_path, "rope1/5.pkl", "rope2/5.pkl", "rope3/5.npz", "rope3/5.csv")
-    with pytest.raises(sb.RecordingError, match=r"rope2.5\.pkl: has the name of .*rope1.5\.pkl \(got '5'\)"):
-        sb.read_recordings(tmp_path, "*/*.pkl")
     with pytest.raises(sb.RecordingError, match=r"5\.npz: has the name of .*5\.csv"):
         sb.read_recordings(tmp_path / "rope3")
 
@@ -91,3 +92,31 @@ def test_a_field_that_is_refused_names_its_file_too(tmp_path: Path) -> None:
     with pytest.raises(sb.RecordingError, match="units: names no known length unit") as caught:
         sb.read_recordings(tmp_path)
     assert caught.value.__notes__ == [f"in {tmp_path / '2.npz'}"]
+
+
+def test_names_that_come_in_several_folders_begin_with_those(tmp_path: Path) -> None:
+    dataset(tmp_path, "rope1/5.pkl", "rope2/5.pkl", "rope2/6.pkl")
+    for path in tmp_path.glob("*/*.json"):  # which name their recordings
+        path.write_text('{"rate": 100}')
+    assert [r.name for r in sb.read_recordings(tmp_path, "*/*.pkl")] == ["rope1_5", "rope2_5", "6"]
+
+
+def test_the_only_folder_below_is_looked_into(tmp_path: Path) -> None:
+    dataset(tmp_path, "deep/down/5.pkl", "__MACOSX/5.pkl", ".trash/7.pkl")
+    (tmp_path / "deep" / "._5.pkl").touch()
+    (one,) = sb.read_recordings(tmp_path)
+    assert one.name == "5" and one.mends[-1] == f"is read from {Path('deep/down')}, below the folder that is given"
+    assert [r.name for r in sb.read_recordings(tmp_path / "deep" / "down" / "5.pkl")] == ["5"]
+
+
+def test_hidden_files_are_no_recordings_and_files_of_laboratories_are_named(tmp_path: Path) -> None:
+    dataset(tmp_path, "1.pkl")
+    for name in (".DS_Store", "._1.pkl", "README", "2.pkl.gz", "all.mat"):
+        (tmp_path / name).write_bytes(b"not a recording")
+    refused: dict[str, sb.RecordingError] = {}
+    assert [r.name for r in sb.read_recordings(tmp_path, refused=refused)] == ["1"]
+    assert sorted(refused) == ["2.pkl.gz", "all.mat"] and "gunzip" in refused["2.pkl.gz"].fix
+    assert [r.name for r in sb.read_recordings(tmp_path)] == ["1"]
+    (tmp_path / "1.pkl").unlink()
+    with pytest.raises(sb.RecordingError, match=r"2\.pkl\.gz: is of a kind that is not read .*gunzip"):
+        sb.read_recordings(tmp_path)

@@ -216,7 +216,10 @@ def test_what_the_program_registered_is_not_run(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "content",
     [
-        {"positions": FRAMES},
+        {"forces": FRAMES[0]},
+        {1: FRAMES},
+        {"left": FRAMES, "right": FRAMES},
+        [{"positions": FRAMES[0]}],
         [np.ma.masked_array(FRAMES[0])],
         [np.array(["a"])],
         [np.array([1 + 2j])],
@@ -227,7 +230,7 @@ def test_what_the_program_registered_is_not_run(tmp_path: Path) -> None:
         "text",
         None,
         7.5,
-        [FRAMES[0], None],
+        [None, None],
         [FRAMES[0], [FRAMES[1]]],
         [np.float64],
         [np.dtype("f8")],
@@ -312,7 +315,9 @@ def lost(marker: int) -> list[np.ndarray]:
         ([FRAMES[0], FRAMES[1][:, :5]], r"frame 1: has another number of markers \(got 5\).*6"),
         ([FRAMES[0], np.stack(FRAMES)], "frame 1: must have the shape"),
         ([np.float64(1.0)], r"frame 0: must have the shape .*\(got \(\)\)"),
-        (lost(2), r"never seen.*'m2'"),
+        ([np.full((3, 6), np.nan)], "never seen"),
+        (np.stack([FRAMES, FRAMES]), r"\(got \(2, 5, 3, 6\)\).* seems to hold 2 recordings"),
+        (POSITIONS.reshape(5, 18), r"\(got \(5, 18\)\).*reshape\(len\(x\), -1, 3\)"),
         ([np.where(frame == frame[0], np.nan, frame) for frame in FRAMES], "some coordinates only"),
         ([np.full((3, 6), np.inf)], "infinite"),
     ],
@@ -336,6 +341,84 @@ def test_another_order_of_axes_is_refused_with_what_puts_it_right(
     put_right = wrong.transpose([int(k) for k in told.split(",")])
     np.testing.assert_array_equal(put_right, right)
     assert Recording.load(stored(tmp_path, form(np.ascontiguousarray(put_right)))).positions.shape == (600, 12, 3)
+
+
+def moving(frames: int = 60, markers: int = 12) -> np.ndarray:
+    """(frames, 3, markers): a chain that swings, as no random numbers do."""
+    t, s = np.arange(frames)[:, None] / 100, 0.08 * np.arange(markers)
+    return np.stack([s + 0.0 * t, 0.2 * np.sin(4.0 * t + s), 0.1 * s * (s - 1.0) + 0.0 * t], axis=1)
+
+
+@pytest.mark.parametrize("form", [np.asarray, np.ndarray.tolist, list], ids=["array", "lists", "list of arrays"])
+@pytest.mark.parametrize("axes", [(0, 2, 1), (1, 2, 0), (1, 0, 2), (2, 1, 0), (2, 0, 1)])
+def test_another_order_of_axes_is_read_where_the_motion_shows_it(
+    tmp_path: Path, axes: tuple[int, ...], form: Callable[[np.ndarray], object]
+) -> None:
+    right = moving()
+    path = stored(tmp_path, form(np.ascontiguousarray(right.transpose(axes))))
+    recording = Recording.load(beside(path, rate=100))
+    assert np.array_equal(recording.positions, right.transpose(0, 2, 1)) and recording.clamped == (0, 1, 10, 11)
+    told = [("frames", "coordinates", "markers")[k] for k in axes]
+    expected = f"its axes are ({', '.join(told)}) instead of (frames, coordinates, markers), and are taken as such"
+    assert recording.mends == [expected]
+
+
+@pytest.mark.parametrize("axes", [(0, 1, 2), (0, 2, 1), (2, 1, 0)])
+@pytest.mark.parametrize(("unit", "first"), [(1.0, False), (1e3, True), (1e9, False)])
+def test_times_beside_the_coordinates_are_read(tmp_path: Path, axes: tuple[int, ...], unit: float, first: bool) -> None:
+    right = moving()
+    times = 5.0 + np.arange(60) / 120
+    rows = np.broadcast_to(unit * times[:, None, None], (60, 1, 12))
+    timed = np.concatenate([rows, right] if first else [right, rows], axis=1)
+    recording = Recording.load(stored(tmp_path, np.ascontiguousarray(timed.transpose(axes))))
+    assert np.array_equal(recording.positions, right.transpose(0, 2, 1))
+    np.testing.assert_allclose(recording.times, times - 5.0, atol=1e-6)
+    assert recording.mends[-1].startswith(f"the row of number {0 if first else 3} beside its coordinates")
+    rows = rows[::-1]  # which do not rise
+    with pytest.raises(RecordingError, match="must have the shape"):
+        Recording.load(stored(tmp_path, np.concatenate([right, rows], axis=1)))
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+@pytest.mark.parametrize("name", ["positions", "Markers", "x"])
+def test_a_dict_with_markers_is_read(tmp_path: Path, name: str, protocol: int) -> None:
+    times = np.array([3.0, 3.01, 3.03, 3.04, 3.05])
+    beside_them = {"names": list("abcdef"), "time": times, "note": "first", "forces": np.zeros((5, 3))}
+    recording = Recording.load(stored(tmp_path, {name: FRAMES, **beside_them}, protocol))
+    assert np.array_equal(recording.positions, POSITIONS) and recording.mends == []
+    np.testing.assert_allclose(recording.times, times - 3.0)
+    rated = Recording.load(stored(tmp_path, {name: POSITIONS.transpose(0, 2, 1), "fps": 240}, protocol))
+    np.testing.assert_allclose(rated.times, np.arange(5) / 240)
+
+
+def test_frames_that_hold_nothing_show_no_marker(tmp_path: Path) -> None:
+    for nothing in (None, [], np.zeros((3, 0))):
+        recording = Recording.load(stored(tmp_path, [FRAMES[0], nothing, *FRAMES[2:]]))
+        assert np.isnan(recording.positions[1]).all() and np.array_equal(recording.positions[2:], POSITIONS[2:])
+        assert recording.mends[0] == "1 of 5 frames hold nothing: no marker is seen there"
+    rows = [[[None if np.isnan(x) else x for x in row] for row in frame.tolist()] for frame in lost(2)[:4]]
+    assert np.isnan(Recording.load(stored(tmp_path, [*rows, FRAMES[4].tolist()])).positions[:4, 2]).all()
+
+
+def test_a_marker_that_is_never_seen_is_left_out(tmp_path: Path) -> None:
+    recording = Recording.load(stored(tmp_path, lost(2)))
+    assert recording.markers == ("m0", "m1", "m3", "m4", "m5") and recording.clamped == (0, 1, 3, 4)
+    assert "m2 of 6 markers is never seen: left out" in recording.mends
+
+
+def test_a_rate_that_is_assumed_is_told(tmp_path: Path) -> None:
+    path = stored(tmp_path, FRAMES)
+    (said,) = Recording.load(path).mends
+    assert said.startswith("no rate is told: 100 frames per second are assumed")
+    assert Recording.load(beside(path, rate=100)).mends == []
+    path.with_suffix(".json").unlink()
+    folder = path.parent / "train"
+    folder.mkdir()
+    beside(folder, rate=50, units="mm", markers=6, name="all of them")  # of these, what can hold for all files
+    other = Recording.load(path.rename(folder / path.name))
+    assert other.times[1] == 0.02 and other.mends == [] and other.name == "motion"
+    np.testing.assert_allclose(other.positions, 1e-3 * POSITIONS)
+    assert Recording.load(beside(folder / path.name, rate=25)).times[1] == 0.04  # its own counts
 
 
 def beside(path: Path, **content: object) -> Path:

@@ -63,8 +63,18 @@ def load_ropes(config: GrippedConfig, folder: Path) -> list[RopeData]:
         where = f"gripped_rope[{i}]"
         train = _load(section, where, "train", folder / section.train)
         unseen = Screened(()) if section.eval is None else _load(section, where, "eval", folder / section.eval)
-        ropes.append(RopeData(section, train, unseen))
+        ropes.append(RopeData(section, train, replace(unseen, notes=(*unseen.notes, *_fitted_too(train, unseen)))))
     return ropes
+
+
+def _fitted_too(train: Screened, unseen: Screened) -> list[str]:
+    """Words on recordings that are to be predicted unseen, and are fitted."""
+    fitted = {m.recording.positions.tobytes(): m.recording.name for m in train}
+    return [
+        f"{m.recording.name} of eval has the same positions as {name} of train: its error is not that of an unseen one"
+        for m in unseen
+        if (name := fitted.get(m.recording.positions.tobytes())) is not None
+    ]
 
 
 def _load(section: GrippedRopeSection, where: str, part: str, folder: Path) -> Screened:
@@ -74,7 +84,7 @@ def _load(section: GrippedRopeSection, where: str, part: str, folder: Path) -> S
         found = _reordered(found, section.reorder, f"{where}.reorder", part)
         if section.clamped is not None:
             found = [replace(r, clamped=marker_indices("clamped", section.clamped, r.markers)) for r in found]
-        motions = screened(found, section.smoothing)
+        motions = screened(found, section.smoothing, section.units is None)
     except RecordingError as error:
         which = "" if error.field in ("folder", str(folder)) else f"{error.field} "
         raise ConfigError(f"{where}.{part}", f"{which}{error.problem}", error.got, error.fix) from error

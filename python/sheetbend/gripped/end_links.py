@@ -82,7 +82,7 @@ def end_link(positions: Array, outer: int, inner: tuple[int, int], usual: Array 
     known = float(usual[link]) if usual is not None else np.nan
     others = bool(np.isfinite(known))
     if not others:
-        free = _chords(positions[:, inner[0] + 1 : inner[1]])
+        free = long_chords(positions[:, inner[0] + 1 : inner[1]])
         free = free[np.isfinite(free)]
         known = float(np.median(free)) if len(free) and free.max() <= EVEN * free.min() else np.nan
     return EndLink(_long(given), _long(exchanged), known, others)
@@ -98,7 +98,7 @@ def usual_links(positions: Sequence[Array], inner: Sequence[tuple[int, int]]) ->
     """
     found: dict[int, list[Array]] = {}
     for x, ends in zip(positions, inner, strict=True):
-        links = _chords(x)
+        links = long_chords(x)
         last = x.shape[1] - 1
         for outer in {0, ends[0] - 1, ends[1] + 1, last}:
             if end_link(x, outer, ends) is not None:
@@ -107,7 +107,7 @@ def usual_links(positions: Sequence[Array], inner: Sequence[tuple[int, int]]) ->
     return {count: _medians(np.array(every)) for count, every in found.items()}
 
 
-def _chords(positions: Array) -> Array:
+def long_chords(positions: Array) -> Array:
     """(markers - 1,) m, long distances of neighbors."""
     distance = np.linalg.norm(np.diff(positions, axis=1), axis=2)
     return np.array([_long(d) for d in distance.T])

@@ -1,5 +1,5 @@
-"""Mends a single recording of a gripped rope: lost frames, exchanged neighbors, markers seen elsewhere, and tracking
-that froze or wrote zeros.
+"""Mends a single recording of a gripped rope: lost frames, exchanged neighbors or labels, markers seen elsewhere, and
+tracking that froze or wrote zeros.
 
 All but the usual lengths of links are found from the recording alone. Two neighbors are exchanged at a frame at which
 the direction from one to the other turns round, and throughout where the line through all markers is then shorter,
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..arrays.timeseries import mean_position
 from ..recording.leaps import elsewhere, leaps, least_leap
 from ..recording.recording import Recording
+from ..recording.relabeled import put_back
 from .end_links import EndLink, end_link
 from .lost_frames import on_time
 
@@ -80,12 +81,12 @@ def steadied_order(recording: Recording) -> tuple[Array, Mask]:
 def _in_order(recording: Recording, inner: tuple[int, int], usual: Array | None) -> tuple[Array, list[str]]:
     """Positions (frames, markers, 3) m with neighbors exchanged back in place, and words on each exchange."""
     positions, wrong = steadied_order(recording)
+    positions, words = put_back(recording.times, positions, recording.markers)  # of markers that are no neighbors
     of = {inner[0] - 1: " of the first grip", inner[1]: " of the last grip"}
     names = {k: f"{a} and {b}{of.get(k, '')}" for k, (a, b) in enumerate(pairwise(recording.markers))}
     exchanged, ends = _throughout(positions, inner, usual)
     for k in exchanged:
         wrong[k] = ~wrong[k]
-    words = []
     for k in np.flatnonzero(wrong.any(axis=1)).tolist():
         or_else = f" (or the rope folds back there: {ends[k].words})" if k in ends and not ends[k].clear else ""
         words.append(f"{names[k]} were exchanged {_when(recording, wrong[k])}, and are put back{or_else}")

@@ -185,11 +185,17 @@ def _bridged(recording: Recording) -> tuple[Recording, Array]:
 
 
 def _check_shown(recording: Recording, positions: Array, chords: Array, inner: tuple[int, int]) -> None:
-    """Raises RecordingError where a free marker is hardly ever seen beside its neighbor, or too few at the start."""
+    """Raises RecordingError where a free marker is hardly ever seen beside its neighbor or is the same as that, or too
+    few are seen at the start."""
     lost = np.flatnonzero(np.isnan(chords))
     if len(lost):
         names = [recording.markers[k] for k in (lost[0], lost[0] + 1)]
         problem = f"of {recording.name} are never seen together for long enough"
+        raise RecordingError("markers", problem, names, "leave one out with `Recording.select`")
+    same = np.flatnonzero(chords == 0.0)
+    if len(same):
+        names = [recording.markers[k] for k in (same[0], same[0] + 1)]
+        problem = f"of {recording.name} are at the same place throughout"
         raise RecordingError("markers", problem, names, "leave one out with `Recording.select`")
     if not _shown(positions[0], inner):
         later = [f"{t:g} s" for t, x in zip(recording.times, positions, strict=True) if _shown(x, inner)]

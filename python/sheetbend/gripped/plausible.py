@@ -20,13 +20,22 @@ ALONG = 0.9  # of the sag, that is along one axis where that axis may point down
 def gravities(motions: Sequence[GrippedMotion]) -> tuple[tuple[float, float, float], ...]:
     """Gravities, m/s^2, that recordings may mean that tell none: the usual one, and the one along the axis of their sag
     where the sag contradicts it. A stiff rope may be bent upwards, so that the sag alone does not decide."""
-    sag, size = _sag(motions), float(np.linalg.norm(GRAVITY))
-    axis = int(np.argmax(np.abs(sag)))
-    down = np.zeros(3)
-    down[axis] = size * np.sign(sag[axis])
-    if not _contradicts(motions, GRAVITY) or abs(sag[axis]) < ALONG * np.linalg.norm(sag):
+    found = sag_axis(motions)
+    if not _contradicts(motions, GRAVITY) or found is None:
         return (GRAVITY,)
+    axis, sign = found
+    down = np.zeros(3)
+    down[axis] = float(np.linalg.norm(GRAVITY)) * sign
     return GRAVITY, (float(down[0]), float(down[1]), float(down[2]))
+
+
+def sag_axis(motions: Sequence[GrippedMotion]) -> tuple[int, int] | None:
+    """The axis along which a rope clearly sags, and the sign; None where there is none."""
+    sag, length = _sag(motions), float(np.mean([m.length for m in motions]))
+    size, axis = float(np.linalg.norm(sag)), int(np.argmax(np.abs(sag)))
+    if size <= SAGS * length or abs(sag[axis]) < ALONG * size:
+        return None
+    return axis, int(np.sign(sag[axis]))
 
 
 def _sag(motions: Sequence[GrippedMotion]) -> Array:

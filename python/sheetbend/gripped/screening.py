@@ -2,11 +2,13 @@
 
 One bad file of many costs that file, not the fit, and a grip that is lost for a while costs part of a file. Left out is
 what no motion can be made of, and what is no recording
-of the same rope as most others: another number of markers, other distances between them, or another length.
+of the same rope as most others: another number of markers, other distances between them, another length, or a sag along
+another axis.
 """
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -17,11 +19,15 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError
 from ..recording.recording import Recording
+from .alike import alike
 from .end_links import usual_links
 from .mend import mended, steadied_order
 from .motion import Array, GrippedMotion, gripped_ends
+from .plausible import sag_axis
 from .stretch import longest_stretch
 
+LEFT_OUT = " is left out: "
+MOST_NAMED = 3  # recordings of which the same is said
 FEWEST = 3  # recordings, from which one may be compared with the others
 OTHER = 0.02  # relative difference of length, and of marker places over the length, that another rope has at least
 SCATTERED = 6.0  # the same over the median difference of the others
@@ -52,11 +58,13 @@ class Screened(Sequence[GrippedMotion]):
         return self.motions[index]
 
 
-def screened(recordings: Sequence[Recording | GrippedMotion], smoothing: float) -> Screened:
-    """Mend recordings, smooth them over `smoothing` s, and leave out those that cannot be used.
+def screened(recordings: Sequence[Recording | GrippedMotion], smoothing: float, units: bool = True) -> Screened:
+    """Bring recordings to one unit, order and direction (`alike`), mend them, smooth them over `smoothing` s, and leave
+    out those that cannot be used.
 
     Args:
         recordings: of one rope. Motions stay as they are; what was screened already is returned.
+        units: whether all of them may be in another unit than meters.
 
     Raises:
         RecordingError: more than half of the recordings cannot be used: the first one's reason.
@@ -64,18 +72,26 @@ def screened(recordings: Sequence[Recording | GrippedMotion], smoothing: float) 
     if isinstance(recordings, Screened):
         return recordings
     kept: list[GrippedMotion] = []
-    notes: list[str] = []
+    notes: list[tuple[str, str]] = []
     errors: list[RecordingError] = []
-    links = _links([r for r in recordings if isinstance(r, Recording)])
+    again = _repeated([r for r in recordings if isinstance(r, Recording)])
+    own = [r for r in recordings if isinstance(r, Recording) and id(r) not in again]
+    changed, changes = alike(own, units)
+    brought = {id(r): (other, words) for r, other, words in zip(own, changed, changes, strict=True)}
+    links = _links(changed)
     for recording in recordings:
         if isinstance(recording, GrippedMotion):
             kept.append(recording)
             continue
+        if id(recording) in again:
+            notes.append((recording.name, f"{LEFT_OUT}it has the same positions as {again[id(recording)]}"))
+            continue
+        same, done = brought[id(recording)]
         words: tuple[str, ...] = ()
         try:
-            inner = gripped_ends(recording)
-            usual = links.get(len(recording.markers))
-            sound, words = mended(recording, inner, usual)
+            inner = gripped_ends(same)
+            usual = links.get(len(same.markers))
+            sound, words = mended(same, inner, usual)
             motion, cut = _usable(sound, inner, smoothing, usual)
             kept.append(motion)
         except RecordingError as error:
@@ -83,13 +99,36 @@ def screened(recordings: Sequence[Recording | GrippedMotion], smoothing: float) 
             if words:
                 error = RecordingError(error.field, f"{error.problem} ({reasons})", error.got, error.fix)
             errors.append(error)
-            notes.append(f"{recording.name} is left out: {reasons or f'{error.field} {error.problem}; {error.fix}'}")
+            why = reasons or f"{error.field} {error.problem}; {error.fix}"
+            notes.append((recording.name, f"{LEFT_OUT}{why}"))
         else:
-            notes += [f"{recording.name}: {what}" for what in (*words, *cut)]
+            notes += [(recording.name, f": {what}") for what in (*recording.mends, *done, *words, *cut)]
     if 2 * len(errors) > len(recordings):
         raise errors[0]
-    same, others = _of_one_rope(kept)
-    return Screened(tuple(same), (*notes, *others))
+    same_rope, others = _of_one_rope(kept)
+    return Screened(tuple(same_rope), (*_gathered(notes), *others))
+
+
+def _gathered(notes: Sequence[tuple[str, str]]) -> list[str]:
+    """Sentences on recordings; what is said of several is said once."""
+    of: dict[str, list[str]] = {}
+    for name, what in notes:
+        of.setdefault(what, []).append(name)
+    return [", ".join(names[:MOST_NAMED]) + _more(len(names)) + what for what, names in of.items()]
+
+
+def _more(count: int) -> str:
+    return f" and {count - MOST_NAMED} more" if count > MOST_NAMED else ""
+
+
+def _repeated(recordings: Sequence[Recording]) -> dict[int, str]:
+    """By id of a recording the name of an earlier one with the same positions."""
+    first: dict[bytes, Recording] = {}
+    return {
+        id(r): other.name
+        for r in recordings
+        if (other := first.setdefault(hashlib.sha256(r.positions.tobytes()).digest(), r)) is not r
+    }
 
 
 def _links(recordings: Sequence[Recording]) -> dict[int, Array]:
@@ -132,22 +171,33 @@ def _of_one_rope(motions: Sequence[GrippedMotion]) -> tuple[list[GrippedMotion],
         for m, n in zip(motions, counts, strict=True)
         if n != usual
     ]
-    alike = [m for m, n in zip(motions, counts, strict=True) if n == usual]
-    length = float(np.median([m.length for m in alike]))
-    longer = np.array([abs(m.length / length - 1.0) for m in alike])
-    places = np.array([m.fractions[m.inner[0] : m.inner[1] + 1] for m in alike])
+    those = [m for m, n in zip(motions, counts, strict=True) if n == usual]
+    length = float(np.median([m.length for m in those]))
+    longer = np.array([abs(m.length / length - 1.0) for m in those])
+    places = np.array([m.fractions[m.inner[0] : m.inner[1] + 1] for m in those])
     moved = np.abs(places - np.median(places, axis=0)).max(axis=1)
     same = []
-    for m, by_length, by_place in zip(alike, _odd(longer), _odd(moved), strict=True):
+    for m, by_length, by_place, by_axis in zip(those, _odd(longer), _odd(moved), _turned(those), strict=True):
         if by_length:
             what = f"its rope is {m.length:.3g} m long, that of the others {length:.3g} m"
         elif by_place:
             what = "its markers have other distances along the rope than the others'"
+        elif by_axis:
+            what = "its rope sags along another axis than the others': turn its axes as theirs are"
         else:
             same.append(m)
             continue
         notes.append(f"{m.recording.name} is left out: {what}")
     return same, notes
+
+
+def _turned(motions: Sequence[GrippedMotion]) -> list[bool]:
+    """Which sag along another axis than all others, which sag along one."""
+    sags = [sag_axis([m]) for m in motions]
+    usual = max(set(sags), key=sags.count)
+    odd = [sag is not None and sag != usual for sag in sags]
+    rest = sum(sag == usual for sag in sags)
+    return odd if usual is not None and rest + sum(odd) == len(sags) and rest > sum(odd) else [False] * len(sags)
 
 
 def _odd(differences: Array) -> NDArray[np.bool_]:

@@ -248,7 +248,7 @@ class Recording(MarkerData):
 
     @property
     def mends(self) -> list[str]:
-        """What `mended` did, in sentences; metadata["mended"] keeps them."""
+        """What reading it and `mended` put right or assumed, in sentences; metadata["mended"] keeps them."""
         said = self.metadata.get("mended", [])
         return [str(one) for one in said] if isinstance(said, list) else []
 
@@ -256,7 +256,11 @@ class Recording(MarkerData):
         """Put markers that exchange their labels back, and take those that are elsewhere for some frames as not seen
         there. `mends` tells what was done. Returns the same object where nothing was wrong."""
         positions, said = relabeled(self.times, self.positions, self.markers)
-        return self._derive(positions=positions, metadata={**self.metadata, "mended": said}) if said else self
+        return (
+            self._derive(positions=positions, metadata={**self.metadata, "mended": [*self.mends, *said]})
+            if said
+            else self
+        )
 
     def noise(self) -> Array:
         """(markers,) m: noise of one coordinate, a robust high-frequency residual (`timeseries.noise`)."""

@@ -36,7 +36,7 @@ def relabeled(t: Array, positions: Array, names: Sequence[str]) -> tuple[Array, 
     where a marker is elsewhere; and a sentence on each exchange and each such marker."""
     if len(t) < FEWEST:
         return positions, []
-    x, said = _put_back(t, positions, names)
+    x, said = put_back(t, positions, names)
     near, far = np.nanquantile(x, [0.01, 0.99], axis=(0, 1))  # reflections may be far away
     extent = float(np.linalg.norm(far - near))
     least = least_leap(t, extent)
@@ -51,7 +51,7 @@ def relabeled(t: Array, positions: Array, names: Sequence[str]) -> tuple[Array, 
     return x, said
 
 
-def _put_back(t: Array, positions: Array, names: Sequence[str]) -> tuple[Array, list[str]]:
+def put_back(t: Array, positions: Array, names: Sequence[str]) -> tuple[Array, list[str]]:
     """Positions (frames, markers, 3) m, and a sentence on every frame from which on labels are exchanged.
 
     The places of markers are extrapolated from the frames before. Where several markers are far from theirs, and each

@@ -15,7 +15,8 @@ from .cells import Row, number, refuse
 _WORDS = "time|timestamp|t|zeit|temps|tiempo|tempo|tijd|czas|время|时间|時間"
 _NAME = re.compile(rf"(%time)|(?:{_WORDS})[\s_/]*[(\[]?\s*(s|sec|seconds|ms|us|ns)?\s*[)\]]?", re.IGNORECASE)
 _LONGEST = 40  # characters: blanks of a longer one would be matched in ever more ways
-_PER_SECOND = {"ms": 10**3, "us": 10**6, "ns": 10**9}
+PER_SECOND = {"ms": 10**3, "us": 10**6, "ns": 10**9}
+"""Parts of a second, by the unit that counts them."""
 _LATEST = 1e11  # s: later than any clock that counts seconds
 _SHORTEST = 1e-7  # s between two frames, which no camera reaches
 _FEW = 10  # rows from which on this is judged
@@ -28,7 +29,7 @@ def unit(name: str) -> str | None:
     if match is None:
         return None
     told = "ns" if match[1] else (match[2] or "s").lower()
-    return told if told in _PER_SECOND else "s"
+    return told if told in PER_SECOND else "s"
 
 
 def times(path: Path, rows: Sequence[Row], unit: str) -> Array:
@@ -46,7 +47,7 @@ def times(path: Path, rows: Sequence[Row], unit: str) -> Array:
         return found
     exact = [_exact(path, line, cells[0]) for line, cells in rows]
     first = min((time for time in exact if time is not None), default=Decimal(0))
-    found = np.array([np.nan if t is None else float((t - first) / _PER_SECOND[unit]) for t in exact])
+    found = np.array([np.nan if t is None else float((t - first) / PER_SECOND[unit]) for t in exact])
     apart = np.abs(np.diff(found))
     if len(found) >= _FEW and 0.0 < np.nanmedian(apart) < _SHORTEST:
         fix = "name the column after the unit that it counts: time, time_ms, time_us or time_ns"

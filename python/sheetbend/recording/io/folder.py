@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from ...errors import RecordingError
 from ..recording import Recording
-from . import FORMATS
+from . import ELSEWHERE, FORMATS
 from .natural import by_number
 
 NOTES = ".txt"
 """Files of this suffix are tables or notes: in a folder they count as recordings only where the pattern names it."""
+MOST_NAMED = 6  # folders beside one that is missing
+FOREIGN = ("__MACOSX", "__pycache__")
+"""Folders that other programs leave behind."""
 
 
 def read_recordings(
@@ -25,28 +31,37 @@ def read_recordings(
         unseen = sb.read_recordings("ropes/eval", "*.pkl")
 
     Args:
-        folder: where the files lie. Files that no reader knows, such as the JSON beside a recording, are left out.
+        folder: where the files lie; if it holds none, and one folder below it does, those. Files that no reader knows,
+            such as the JSON beside a recording, are left out. Or one file.
         pattern: which files, as for `Path.glob`; "*/*" looks one folder below. Files that end in .txt are read only
             where the pattern does, too.
         units: length unit of the files, as for `Recording.load`.
-        refused: where given, gets the errors of files that cannot be read, by file name, and the others are read.
+        refused: where given, gets the errors of files that cannot be read, by file name, and the others are read. Files
+            of laboratories that are not read (`ELSEWHERE`), such as .mat, are among them.
 
     Returns:
-        As `Recording.load` reads them, each name once.
+        As `Recording.load` reads them, each name once: files of the same name in several folders have that of their
+        folder before it, such as monday_00.
 
     Raises:
         RecordingError: the folder does not exist or holds no recording of that pattern, two recordings have the same
             name, or a file is refused (which is named): all of them where `refused` is given.
     """
     root = Path(folder)
-    if not root.is_dir():
-        raise RecordingError("folder", "is no folder", str(folder), "give the folder that holds the files")
     known = [suffix for suffix in FORMATS if suffix != NOTES or pattern.lower().endswith(NOTES)]
-    files = sorted((p for p in root.glob(pattern) if p.is_file() and p.suffix.lower() in known), key=by_number)
+    files, others = _files(root, pattern, known)
+    errors = {file.name: _of_another_kind(file) for file in others}
+    if refused is not None:
+        refused.update(errors)
+    if not files and errors:
+        raise next(iter(errors.values()))
     if not files:
         inside = sorted(p.name + "/" * p.is_dir() for p in root.iterdir())
-        fix = f"give the folder of the files and a pattern that they match; files end in {' or '.join(known)}"
+        fix = 'give the folder of the files and a pattern that they match ("*/*" looks into its folders); files end in '
+        fix += " or ".join(known)
         raise RecordingError(f"{folder}", f"holds no recording that matches {pattern!r}", inside, fix)
+    stems = Counter(file.stem for file in files)
+    below = files[0] != root and files[0] not in root.glob(pattern)
     first: dict[str, Path] = {}
     found = []
     for file in files:
@@ -57,6 +72,11 @@ def read_recordings(
                 raise
             refused[file.name] = error
             continue
+        if below:
+            said = f"is read from {file.parent.relative_to(root)}, below the folder that is given"
+            recording = replace(recording, metadata={**recording.metadata, "mended": [*recording.mends, said]})
+        if recording.name == file.stem and stems[file.stem] > 1 and file.parent != root:
+            recording = replace(recording, name="_".join(file.relative_to(root).with_suffix("").parts))
         other = first.setdefault(recording.name, file)
         if other is not file:
             fix = "narrow the pattern, or give one of them another name in its JSON"
@@ -65,6 +85,36 @@ def read_recordings(
     if not found and refused:
         raise next(iter(refused.values()))
     return found
+
+
+def _files(root: Path, pattern: str, known: Sequence[str]) -> tuple[list[Path], list[Path]]:
+    """Recordings and files of known kinds that are not read, which match the pattern, in order; where the folder holds
+    neither, those of the only folder below it that does. Hidden files are nobody's recordings."""
+    if root.is_file():
+        return [root], []
+    if not root.is_dir():
+        beside = sorted(p.name for p in root.parent.iterdir() if p.is_dir()) if root.parent.is_dir() else []
+        fix = "give the folder that holds the files" + (
+            f"; {root.parent.name} holds {', '.join(beside[:MOST_NAMED])}" if beside else ""
+        )
+        raise RecordingError("folder", "is no folder", str(root), fix)
+    for own in (pattern, f"**/{pattern}"):
+        matching = sorted(
+            (p for p in root.glob(own) if p.is_file() and not _hidden(p.relative_to(root))), key=by_number
+        )
+        files = [p for p in matching if p.suffix.lower() in known]
+        others = [p for p in matching if p.suffix.lower() in ELSEWHERE]
+        if (files or others) and (own == pattern or len({p.parent for p in matching}) == 1):
+            return files, others
+    return [], []
+
+
+def _of_another_kind(file: Path) -> RecordingError:
+    return RecordingError(str(file), "is of a kind that is not read", file.suffix, ELSEWHERE[file.suffix.lower()])
+
+
+def _hidden(path: Path) -> bool:
+    return any(part.startswith(".") or part in FOREIGN for part in path.parts)
 
 
 def _load(file: Path, units: str | None) -> Recording:

@@ -1,15 +1,17 @@
 """Pickles of arrays or lists of numbers, read without running anything that the file names.
 
 A pickle is a program, and `pickle.load` calls whatever it names. Here a machine of its own walks the program: it knows
-the instructions that arrays and lists of numbers need, and of names what NumPy writes into pickles of its arrays
-(`pickled_arrays`). All else is refused by name. A program cannot ask for more than it is long: lists go no deeper than
-arrays, lists that stand in another one stay as they are, and instructions are counted.
+the instructions that arrays and lists of numbers need, a dict of them by name, and of names what NumPy writes into
+pickles of its arrays (`pickled_arrays`). All else is refused by name. A program cannot ask for more than it is long:
+lists go no deeper than arrays, lists that stand in another one stay as they are, and instructions are counted.
 """
 
 from __future__ import annotations
 
+import math
 import pickletools
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -55,19 +57,21 @@ _DAMAGE = (AttributeError, LookupError, OverflowError, TypeError, ValueError)
 _AGAIN = "export or copy the file again"
 
 
-def arrays(path: Path) -> NDArray[Any] | list[NDArray[Any]]:
-    """The array that the pickle at `path` holds, or its list (or tuple) of arrays, or of lists of rows of numbers; of
-    any protocol.
+Content = NDArray[Any] | list[NDArray[Any]]
+
+
+def arrays(path: Path) -> Content | dict[str, Content]:
+    """The array that the pickle at `path` holds, or its list (or tuple) of arrays, or of lists of rows of numbers, or a
+    dict of these by name; of any protocol. An entry of a list that is None is an array without numbers, and a number
+    that is None is NaN. What else stands in a dict is left out.
 
     Raises:
         RecordingError: the file is no pickle or a damaged one, names anything but NumPy's plain arrays (which is then
-            named), holds anything but one array or a list of them, or more than `MOST_INSTRUCTIONS`.
+            named), holds anything but arrays or lists of them, or more than `MOST_INSTRUCTIONS`.
     """
     try:
         value = _Machine(path).run(path.read_bytes())
-        if not isinstance(value, _Items):
-            return _values(path, "the pickle", value)
-        return _entries(path, value)
+        return _by_name(path, value) if isinstance(value, _Named) else _content(path, "the pickle", value)
     except NoNumberError as error:
         fix = "store plain numbers, such as float64"
         raise RecordingError(str(path), "holds an array that is not of real numbers", str(error), fix) from None
@@ -75,6 +79,19 @@ def arrays(path: Path) -> NDArray[Any] | list[NDArray[Any]]:
         raise
     except _DAMAGE as error:
         raise RecordingError(str(path), "is no pickle, or a damaged one", str(error), _AGAIN) from error
+
+
+def _content(path: Path, what: str, value: object) -> Content:
+    return _entries(path, value) if isinstance(value, _Items) else _values(path, what, value)
+
+
+def _by_name(path: Path, named: _Named) -> dict[str, Content]:
+    found: dict[str, Content] = {}
+    for name, entry in named.entries.items():
+        number = _number(entry)
+        with suppress(RecordingError, NoNumberError):  # texts and names describe the arrays
+            found[name] = _content(path, name, entry) if number is None else np.array(number)
+    return found
 
 
 def _entries(path: Path, whole: _Items) -> list[NDArray[Any]]:
@@ -85,7 +102,7 @@ def _entries(path: Path, whole: _Items) -> list[NDArray[Any]]:
             if isinstance(entry, _Items):
                 numbers += sum(max(len(row), 1) if isinstance(row, _Items) else 1 for row in entry)
                 check_room(path, f"{numbers} numbers up to entry {i}", 8 * numbers)
-            found[id(entry)] = _values(path, f"entry {i}", entry)
+            found[id(entry)] = np.zeros(0) if entry is None else _values(path, f"entry {i}", entry)
     return [found[id(entry)] for entry in whole]
 
 
@@ -106,11 +123,14 @@ def _values(path: Path, what: str, value: object) -> NDArray[Any]:
 def _number(value: object) -> float | None:
     if isinstance(value, Array) and value.values is not None and value.values.shape == ():
         return float(value.values)
+    if value is None:
+        return math.nan
     return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
 
 
 def _kind(value: object) -> str:
-    return "list" if isinstance(value, _Items) else type(value).__name__.lower()
+    names = {_Items: "list", _Named: "dict"}
+    return names.get(type(value), type(value).__name__.lower())
 
 
 class _Items(list[Any]):
@@ -133,7 +153,29 @@ class _Items(list[Any]):
         if self.closed:
             raise ValueError("a list that grows after it was put into another one")
         if self.depth > DEEPEST:
-            raise ValueError(f"lists in more than {DEEPEST} levels")
+            raise ValueError(
+                f"lists in more than {DEEPEST} levels: a file holds one recording, frames of rows of numbers"
+            )
+
+
+class _Named:
+    """A dict of the program, by names."""
+
+    __slots__ = ("entries",)
+
+    def __init__(self, pairs: Iterable[Any] = ()) -> None:
+        self.entries: dict[str, Any] = {}
+        self.take(pairs)
+
+    def take(self, pairs: Iterable[Any]) -> None:
+        """Set entries: names and values in turn."""
+        items = list(pairs)
+        for name, value in zip(items[::2], items[1::2], strict=True):
+            if not isinstance(name, str):
+                raise TypeError(f"a dict with a {_kind(name)} as a key, where a name belongs")
+            if isinstance(value, _Items):
+                value.closed = True
+            self.entries[name] = value
 
 
 class _Machine:
@@ -193,6 +235,14 @@ class _Machine:
                 self.grow([item])
             case "APPENDS":
                 self.grow(self.to_mark())
+            case "EMPTY_DICT":
+                self.stack.append(_Named())
+            case "DICT":
+                self.stack.append(_Named(self.to_mark()))
+            case "SETITEM":
+                self.grow(self.last(2), _Named)
+            case "SETITEMS":
+                self.grow(self.to_mark(), _Named)
             case "GLOBAL":
                 self.stack.append(self.named(argument.replace(" ", ".", 1)))
             case "INST":
@@ -234,8 +284,8 @@ class _Machine:
         del self.stack[-count:]
         return items
 
-    def grow(self, items: list[Any]) -> None:
-        if not isinstance(self.stack[-1], _Items):
+    def grow(self, items: list[Any], what: type[_Items | _Named] = _Items) -> None:
+        if not isinstance(self.stack[-1], what):
             raise TypeError(f"items of a {_kind(self.stack[-1])}")
         self.stack[-1].take(items)
 

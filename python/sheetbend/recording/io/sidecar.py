@@ -7,6 +7,9 @@
     gravity   [x, y, z] in m/s^2, in place of what the file's format says
     rate      frames per second, Hz, for files that hold no times (the first frame is at 0 s); elsewhere metadata
 
+The JSON beside the folder that the file lies in (`train.json` of `train/`) may tell units, clamped, gravity and rate of
+all of its files; what the file's own says counts.
+
 All else is metadata, kept as it stands and in its own units: known values, license, attribution. Text under
 `markers` or `clamped` is a remark, kept as `markers_note` and `clamped_note`; units that say more than the
 length are kept as `units_note`. `arrays` describes the file, not the recording, and is not kept.
@@ -31,6 +34,7 @@ from ..marker_data import UNNAMED, MarkerData
 from ..recording_checks import checked_markers, default_markers, marker_indices
 
 _RESERVED = ("units", "name", "markers", "clamped", "gravity", "arrays")
+_OF_A_FOLDER = ("units", "clamped", "gravity", "rate")
 _SAME_FRAME = 1e-6  # frame intervals
 _FASTEST = 1e15  # Hz: beyond it times of frames coincide
 
@@ -106,12 +110,17 @@ def _reserved(assumed: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def beside(path: Path) -> dict[str, Any]:
-    """What the JSON beside a recording says; nothing where there is none.
+    """What the JSON beside a recording says, and the one beside its folder; nothing where there is none.
 
     Raises:
-        RecordingError: it is malformed.
+        RecordingError: one of them is malformed.
     """
-    path = path.with_suffix(".json")
+    folder = path.absolute().parent
+    of_all = _said(folder.with_name(f"{folder.name}.json")) if folder.name else {}
+    return {key: of_all[key] for key in _OF_A_FOLDER if key in of_all} | _said(path.with_suffix(".json"))
+
+
+def _said(path: Path) -> dict[str, Any]:
     note(path)
     if not path.is_file():
         return {}
