@@ -149,6 +149,12 @@ def test_a_zero_that_is_off_is_named_with_its_size(exact) -> None:
     assert "With that it would be 0.1199" in density.words
 
 
+def test_readings_that_are_late_are_named_with_their_delay(exact) -> None:
+    late = readings(SAMPLES - 0.01).forces
+    result = fitted(exact, lambda own: replace(own, forces=late))
+    assert any("as if wrist read 9.8 ms too late (its clock)" in words for words in result.warnings)
+
+
 def test_noise_is_no_gain(exact) -> None:
     """Of measured readings instead of simulated ones it would be: readings of nothing have none."""
     e = watched(exact, replace(exact[2], torques=None), noise=1.0)

@@ -9,7 +9,8 @@ import pytest
 import sheetbend as sb
 from pytest import approx
 from sheetbend.doubts.driven_errors import MOST_NUMBERS, driven_errors, driven_span
-from sheetbend.doubts.told import FARTHER, told_numbers
+from sheetbend.doubts.told import told_numbers
+from sheetbend.doubts.told_inputs import FARTHER
 from sheetbend.doubts.wrong_given import wrong_given
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.problem import FitProblem

@@ -18,6 +18,7 @@ from ..errors import SheetbendError
 from ..experiment.force_sensor import ForceSensor
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
+from .told_inputs import turned
 
 Says = Callable[[float], str]
 
@@ -127,7 +128,7 @@ def _of_sensor(sensor: ForceSensor) -> Iterator[tuple[str, str, tuple[float, str
         yield "force_delay", f"clock of {name}", (1e-3, "1 ms"), _delay(times), _late(name)
     for axis in "xyz":
         step = math.radians(1.0), "1 degree"
-        yield "force_direction", f"{name} about {axis}", step, _turn(axis), _turned(name, axis)
+        yield "force_direction", f"{name} about {axis}", step, _turn(axis), turned(name, axis)
 
 
 def _zeros(own: _Readings) -> Iterator[tuple[str, str, tuple[float, str], Change, Says]]:
@@ -161,12 +162,6 @@ def _reads(name: str) -> Says:
 
 def _late(name: str) -> Says:
     return lambda size: f"{name} read {short(1e3 * abs(size), 2)} ms too {'late' if size > 0 else 'early'} (its clock)"
-
-
-def _turned(name: str, axis: str) -> Says:
-    return lambda size: (
-        f"{name} were turned by {short(math.degrees(abs(size)), 2)} degrees about {'' if size > 0 else '-'}{axis}"
-    )
 
 
 def _off(name: str, axis: str, unit: str) -> Says:

@@ -6,7 +6,6 @@ set of tangents. That of markers, clamps and clocks comes from what the simulate
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -22,30 +21,24 @@ from ..minimum.problem import FitProblem
 from ..motion.core_terms import divergence
 from ..objects.markers import Place
 from ..quantities.quantities import Quantity
-from ..quantities.wording import short
 from ..recording.recording import Recording
 from ..scene.air import WIND
 from .draft import drafts
-from .marker_mass import MOST_EACH, marker_load, unseen_mass
 from .sensor_errors import sensor_errors
-from .tangents import Input, tangents
+from .tangents import tangents
+from .told_inputs import AXES, STEPS, gravity_turns, told_inputs
+from .told_inputs import GROUPS as OF_INPUTS
 
 Rows = slice | NDArray[np.bool_]
 
-AXES = "xyz"
-DEGREE, MILLIMETER = math.pi / 180.0, 1e-3
-STEPS = {"rad": (DEGREE, "1 degree"), "m": (MILLIMETER, "1 mm"), "s": (1e-3, "1 ms")}
 GROUPS: Mapping[str, tuple[str, tuple[float, str]]] = {
-    "gravity": ("rad", STEPS["rad"]),
+    **OF_INPUTS,
     "clamps": ("m", STEPS["m"]),
     "clamp_direction": ("rad", STEPS["rad"]),
-    "collider_direction": ("rad", STEPS["rad"]),
-    "markers": ("m", (MILLIMETER, "1 mm each")),
-    "gravity_size": ("", (3e-3, "0.3 %")),  # what it differs by on Earth
+    "markers": ("m", (STEPS["m"][0], "1 mm each")),
     "recording_clock": ("", (1e-3, "0.1 %")),
     "recording_delay": ("s", STEPS["s"]),
     "recording_size": ("", (5e-3, "0.5 %")),
-    "drive_size": ("", (0.01, "1 %")),
     "drive_place": ("m", STEPS["m"]),
     "draft": ("m/s", (0.2, "0.2 m/s")),  # of which people in a room hardly feel anything
     "marker_offset": ("m", STEPS["m"]),
@@ -54,14 +47,11 @@ GROUPS: Mapping[str, tuple[str, tuple[float, str]]] = {
     "force_delay": ("s", STEPS["s"]),
     "force_zero": ("N", (0.0, "")),  # of each sensor its sigma
     "torque_zero": ("N m", (0.0, "")),
-    "marker_mass": ("kg", (MOST_EACH, f"{short(1e3 * MOST_EACH)} g each")),
 }
 """Told numbers that are no quantities, by the name under which a standard deviation is given: unit ("" where it is
 relative) and step."""
-SIZE, LATER, SLOWER, LARGER = "size of gravity", "frames later", "clock", "size of the recording"
-FARTHER, ASIDE = "path of the drive", "place of the drive"
-DRAFT = "draft along"
-WEIGHTS, BESIDE = "mass of each marker", "offset of markers"
+LATER, SLOWER, LARGER = "frames later", "clock", "size of the recording"
+ASIDE, DRAFT, BESIDE = "place of the drive", "draft along", "offset of markers"
 _NONE = np.zeros(0)
 
 
@@ -127,9 +117,7 @@ def _collect(
     problem: FitProblem, u: Array, i: int, e: Experiment, r: Recording, corrected: Array | None
 ) -> Iterator[Told]:
     theta, slots, _ = problem.known(u)
-    toward = _gravity(e)
-    names = {f"gravity toward {AXES[axis]}": v for axis, v in toward.items()}
-    size = {SIZE: e.scene.gravity} if toward else {}
+    own = theta[slots[i]]
     made: list[tuple[float, Told]] = []
     asked: list[tuple[str, int, bool]] = []
     for name, k, value, factor, q in told_quantities(problem, u, i):
@@ -140,32 +128,27 @@ def _collect(
         weight = 1.0 if log else abs(value) if step[0] else factor
         made.append((weight, Told(i, name, name, q.unit, step[1:], _NONE, value=value, relative=step[0])))
         asked.append((name, k, log))
-    made += [(1.0, Told(i, "gravity", name, "rad", STEPS["rad"], _NONE)) for name in names]
-    made += [(1.0, Told(i, "gravity_size", SIZE, *GROUPS["gravity_size"], _NONE, relative=True)) for _ in size]
-    turns = _turns(e)
-    made += [
-        (1.0, Told(i, "collider_direction", at, "rad", STEPS["rad"], _NONE, missing=_turned(at), signed=True))
-        for at in turns
-    ]
-    inputs = e.scene.compiled.inputs(theta[slots[i]])
-    path, weights = _path(e, inputs), _weights(e, inputs)
-    made += [(1.0, Told(i, "drive_size", FARTHER, *GROUPS["drive_size"], _NONE, relative=True)) for _ in path]
-    made += [(1.0, Told(i, "marker_mass", label, "kg", step, _NONE)) for label, (step, _) in weights.items()]
-    blown, moves = drafts(problem, u, i, inputs)
-    blows = {f"{DRAFT} {AXES[axis]}": more for axis, more in enumerate(moves)}
-    made += [(1.0, Told(i, "draft", label, *GROUPS["draft"], _NONE)) for label in blows]
+    blown, moves = drafts(problem, u, i, e.scene.compiled.inputs(own))
+    added: dict[str, Any] = {}
+    for given in told_inputs(e, own, blown.experiments[i]):
+        one = Told(i, given.name, given.label, given.unit, given.step, _NONE, relative=not given.unit)
+        made.append((1.0, replace(one, missing=given.says, signed=given.says is not None)))
+        added[given.label] = given.added
+    for axis, more in enumerate(moves):
+        label = f"{DRAFT} {AXES[axis]}"
+        made.append((1.0, Told(i, "draft", label, *GROUPS["draft"], _NONE)))
+        added[label] = more
     by_gravity: dict[int, Array] = {}
     if made:
-        loads = {label: load for label, (_, load) in weights.items()}
-        columns = tangents(blown, u, i, names | size | turns | path | loads | blows, asked, corrected)
+        columns = tangents(blown, u, i, added, asked, corrected)
         for (weight, one), column in zip(made, columns.T, strict=True):
             yield replace(one, column=weight * column)
-        by_gravity = {axis: columns[:, len(asked) + n] for n, axis in enumerate(toward)}
+        by_gravity = {axis: columns[:, len(asked) + n] for n, axis in enumerate(gravity_turns(e))}
     for error in sensor_errors(problem, u, i):
         unit = GROUPS[error.name][0]
         one = Told(i, error.name, error.label, unit, error.step, error.column, relative=not unit)
         yield replace(one, missing=error.says, signed=True)
-    yield from _observe(problem, i, e, r, corrected, theta[slots[i]], by_gravity)
+    yield from _observe(problem, i, e, r, corrected, own, by_gravity)
 
 
 def _step(q: Quantity, value: float, log: bool) -> tuple[bool, float, str] | None:
@@ -179,58 +162,6 @@ def _step(q: Quantity, value: float, log: bool) -> tuple[bool, float, str] | Non
     if value != 0.0 and q.scale is None:
         return True, 0.01, "1 %"
     return None if q.scale is None else (False, 0.1 * q.scale, f"{0.1 * q.scale:g} {q.unit}".rstrip())
-
-
-def _turns(e: Experiment) -> dict[str, Input]:
-    """What turns each collider about an axis through its place, at all knots of its motion."""
-    found: dict[str, Input] = {}
-    first = 0
-    for name, collider in e.scene.contacts.colliders.items():
-        knots = first + 6 * np.arange(len(collider.poses.times))
-        first += 6 * len(knots)
-        for axis in range(3):
-            found[f"{name} about {AXES[axis]}"] = "collider_pose", knots + 3 + axis, np.ones(len(knots))
-    return found
-
-
-def _path(e: Experiment, inputs: Array) -> dict[str, Input]:
-    """What lengthens the path of what drives a scene, from where it begins. Where that follows recorded markers, its
-    path is theirs."""
-    if not e.scene.boundary.driven or e.scene.boundary.following:
-        return {}
-    first, size = e.scene.compiled.layout["boundary"]
-    knots = inputs[first : first + size].reshape(len(e.scene.boundary.times), -1)
-    moved = (knots - knots[0]).ravel()
-    return {FARTHER: ("boundary", np.flatnonzero(moved), moved[moved != 0.0])} if moved.any() else {}
-
-
-def _weights(e: Experiment, inputs: Array) -> dict[str, tuple[tuple[float, str], Input]]:
-    """What each marker may weigh without a mass in the model, and where that hangs."""
-    first, size = e.scene.compiled.layout["mass"]
-    each, load = unseen_mass(e, inputs[first : first + size]), marker_load(e)
-    at = np.flatnonzero(load)
-    return {WEIGHTS: ((each, f"{short(1e3 * each, 2)} g each"), ("mass", at, load[at]))} if each > 0.0 else {}
-
-
-def _turned(label: str) -> Callable[[float], str]:
-    name, _, axis = label.rpartition(" about ")
-    return lambda size: (
-        f"{name} were turned by {short(abs(size) / DEGREE, 2)} degrees about {'' if size > 0 else '-'}{axis}"
-    )
-
-
-def _gravity(e: Experiment) -> dict[int, Array]:
-    """Of the two axes that lie most across gravity, what a turn toward each changes of it, m/s^2 per rad."""
-    g = e.scene.gravity
-    size = float(np.linalg.norm(g))
-    if size == 0.0:
-        return {}
-    down = g / size
-    toward = {}
-    for axis in sorted(np.argsort(np.abs(down), kind="stable")[:2].tolist()):
-        across = np.eye(3)[axis] - down[axis] * down
-        toward[axis] = size * across / np.linalg.norm(across)
-    return toward
 
 
 def _observe(
@@ -292,7 +223,7 @@ def _observe(
         turned = change(f"clamps about {AXES[axis]}", "clamp_direction", np.cross(turn, arm))
         g = turned.column
         for toward, column in by_gravity.items():
-            across = _gravity(e)[toward]
+            across = gravity_turns(e)[toward]
             g = g + column[own] * float(np.cross(down, turn) @ across) / float(across @ across)
         yield replace(turned, column=g)
 

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
-from .told import ASIDE, BESIDE, DEGREE, DRAFT, FARTHER, LARGER, LATER, MILLIMETER, SIZE, SLOWER, Told
+from .told import ASIDE, BESIDE, DRAFT, LARGER, LATER, SLOWER, Told
+from .told_inputs import DEGREE, FARTHER, LOADS, MILLIMETER, SIZE, SPEED, UNNAMED
 
 
 def words_of(one: Told, more: float, problem: FitProblem, group: Sequence[int]) -> str:
@@ -30,6 +31,12 @@ def words_of(one: Told, more: float, problem: FitProblem, group: Sequence[int]) 
         return f"the times of the recording{of} were {size} too {'short' if more > 0 else 'long'} (its frame rate)"
     if one.label == FARTHER:
         return f"what drives the scene{of} moved {size} {'farther' if more > 0 else 'less far'}"
+    if one.label == LOADS:
+        return f"the loads{of} were {size} {'larger' if more > 0 else 'smaller'}"
+    if one.label == SPEED:
+        return f"the motion{of} had started {size} {'faster' if more > 0 else 'slower'}"
+    if one.label in UNNAMED.values():
+        return f"{one.label}{of} were {size} {sign}"
     if one.label == LARGER:
         return f"the recording{of} were {size} too {'small' if more < 0 else 'large'} (its scale)"
     if one.name == "gravity":

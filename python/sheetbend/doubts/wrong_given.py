@@ -39,7 +39,8 @@ from .losses_at_zero import is_loss
 from .losses_beside_contacts import lost_beside_contacts
 from .lost_frames import lost_frames
 from .other_losses import LEAVES
-from .told import ASIDE, FARTHER, LARGER, LATER, SLOWER, Told, told_numbers
+from .told import ASIDE, LARGER, LATER, SLOWER, Told, told_numbers
+from .told_inputs import FARTHER
 from .told_words import words_of
 
 MUCH = 2.0

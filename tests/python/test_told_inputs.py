@@ -1,0 +1,182 @@
+"""Given directions of grips, given loads and given speeds: what an error of each moves, and that it is named."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from sheetbend.doubts.given import premises
+from sheetbend.doubts.told import Told, told_numbers
+from sheetbend.doubts.told_words import words_of
+from sheetbend.experiment.wanted import as_parameters
+from sheetbend.minimum.problem import FitProblem
+
+Array = np.ndarray
+SOLVER, TIMES = sb.Solver(h=1 / 300), np.arange(0, 46) / 50
+DEGREE, LITTLE = math.pi / 180.0, 1e-5
+KNOTS = np.linspace(0.0, 1.0, 51)
+FITTED = ["rope_EI", "rope_bend_damping"]
+
+
+def quaternions(rolls: bool) -> Array:
+    """A hand that swings about y, and about its own z if it `rolls`."""
+    swing, roll = 0.25 * np.sin(5 * KNOTS), 0.2 * np.sin(4 * KNOTS) * rolls
+    half = [np.sin(swing / 2), np.cos(swing / 2), np.sin(roll / 2), np.cos(roll / 2)]
+    sy, cy, sz, cz = half
+    return np.stack([sy * sz, sy * cz, cy * sz, cy * cz], axis=1)
+
+
+def turn(about: str, angle: float) -> Array:
+    """A rotation vector as a matrix, of first order beyond nothing that matters here."""
+    axis = np.eye(3)["xyz".index(about)]
+    skew = np.cross(np.eye(3), axis)
+    return np.eye(3) + math.sin(angle) * skew + (1.0 - math.cos(angle)) * skew @ skew
+
+
+def hand(about: str = "y", angle: float = 0.0, rolls: bool = False) -> sb.Grip:
+    """Its axes are those of the world at the start; the tool is turned in them."""
+    by = turn(about, angle)
+    path = np.stack([0.05 * np.sin(4 * KNOTS), 0 * KNOTS, 0.02 * np.sin(5 * KNOTS)], axis=1)
+    return sb.Grip.from_poses(KNOTS, path, quaternions(rolls), by @ [1.0, 0.0, 0.0], by @ [0.0, 0.0, 1.0])
+
+
+LINE = [[0.0, 0.0, 0.0], [0.4, 0.0, 0.0]]
+
+
+def swung_rope(about: str = "y", angle: float = 0.0) -> sb.Scene:
+    own = {"density": 0.05, "EI": 1e-3, "bend_damping": 0.02, "drag_linear": 0.02}
+    return sb.rope(0.4, 8, grip_start=hand(about, angle), points=LINE, pinned=(), **own)
+
+
+def swung_rod(about: str = "y", angle: float = 0.0) -> sb.Scene:
+    points = [[0, 0, 0], [0.1, 0, 0], [0.2, 0.08, 0], [0.3, 0.12, 0]]
+    own = {"density": 0.05, "EI": 1e-3, "GJ": 1e-3, "bend_damping": 0.02, "twist_damping": 0.02, "name": "rope"}
+    return sb.rod(0.34, 8, start=hand(about, angle, rolls=True), points=points, EI2=2e-3, **own)
+
+
+def between(about: str = "y", angle: float = 0.0) -> sb.Scene:
+    """Two clamps that stay."""
+    by = turn(about, angle) @ [1.0, 0.0, 0.0]
+    x = np.linspace(0.0, 0.35, 30)
+    points = np.stack([x, 0 * x, -0.08 * np.sin(np.pi * x / 0.35) ** 2], axis=1)
+    grips = {"grip_start": sb.Grip.fixed(points[0], by), "grip_end": sb.Grip.fixed(points[-1], [1.0, 0.0, 0.0])}
+    return sb.rope(0.4, 10, density=0.05, EI=1e-3, bend_damping=0.02, points=points, pinned=(), **grips)
+
+
+def loaded(size: float = 1.0, about: str = "y", angle: float = 0.0) -> sb.Scene:
+    scene = sb.rope(0.4, 8, density=0.05, EI=1e-3, bend_damping=0.02, clamp_start=(1, 0, 0))
+    force = np.stack([0.05 * np.sin(8 * KNOTS), 0.02 * KNOTS, 0.1 * np.cos(6 * KNOTS)], axis=1)
+    scene.add_force([8], (size * force @ turn(about, angle).T)[:, None], KNOTS)
+    return scene
+
+
+def thrown(speed: float = 1.0) -> sb.Scene:
+    own = {"density": 0.05, "EI": 1e-3, "bend_damping": 0.02, "drag_linear": 0.03, "pinned": ()}
+    v = speed * np.array([[0.0, 0.4, 1.0], [0.2, -0.3, 0.6]])
+    return sb.rope(0.4, 8, points=LINE, velocity=v, **own)
+
+
+def simulated(scene: sb.Scene, times: Array = TIMES) -> Array:
+    return sb.simulate(scene, times, SOLVER).positions[:, scene.ropes["rope"].particles[2:-1]]
+
+
+def problem_of(scene: sb.Scene, measured: Array, times: Array = TIMES, sigma: float = 1e-3) -> FitProblem:
+    recording = sb.Recording(positions=measured, times=times, name="seen")
+    places = [sb.on_particle(int(p)) for p in scene.ropes["rope"].particles[2:-1]]
+    e = sb.Experiment(scene=scene, recording=recording, markers=places, solver=SOLVER, sigma=sigma)
+    return FitProblem([e], as_parameters(FITTED, [e]))
+
+
+def told_of(problem: FitProblem, name: str) -> dict[str, Told]:
+    told, why = told_numbers(problem, problem.parameters.initial())
+    assert not why
+    return {one.label: one for one in told if one.name == name}
+
+
+TURNED = [
+    *((swung_rope, "rope_start", about) for about in "yz"),
+    *((swung_rod, "rope_start", about) for about in "xyz"),
+    *((between, "rope_start", about) for about in "yz"),
+    (lambda about, angle: loaded(1.0, about, angle), "loads", "x"),
+    (lambda about, angle: loaded(1.0, about, angle), "loads", "y"),
+]
+
+
+@pytest.mark.parametrize(("scene", "who", "about"), TURNED)
+def test_a_turn_changes_residuals_as_a_scene_that_is_turned(scene: Any, who: str, about: str) -> None:
+    base = scene(about, 0.0)
+    shown = simulated(base)
+    name = "load_direction" if who == "loads" else "grip_direction"
+    one = told_of(problem_of(base, shown), name)[f"{who} about {about}"]
+    ends = [simulated(scene(about, sign * LITTLE)) for sign in (1, -1)]
+    wanted = (ends[0] - ends[1]).ravel() / (2 * LITTLE) / 1e-3
+    assert np.abs(wanted).max() > 1.0
+    assert one.column == pytest.approx(wanted, abs=1e-4 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize(("scene", "name", "label"), [(loaded, "load_size", "loads"), (thrown, "start_speed", "speed")])
+def test_a_size_changes_residuals_as_another_scene(scene: Any, name: str, label: str) -> None:
+    base = scene(1.0)
+    (one,) = told_of(problem_of(base, simulated(base)), name).values()
+    ends = [simulated(scene(1.0 + sign * LITTLE)) for sign in (1, -1)]
+    wanted = (ends[0] - ends[1]).ravel() / (2 * LITTLE) / 1e-3
+    assert one.label.startswith(("size of the " + label, label)) and one.relative
+    assert one.column == pytest.approx(wanted, abs=1e-4 * np.abs(wanted).max())
+
+
+def test_what_is_a_quantity_is_told_as_that() -> None:
+    """Forces with a name, a clamp whose angle is a quantity, a grip with tilts, and one clamp that holds all."""
+    scene = sb.Scene("thrown")
+    body = scene.add_body("block", mass=0.1, inertia=[1e-3, 1e-3, 1.5e-3])
+    scene.add_force(body.point((0.1, 0, 0)), (0.0, 0.0, 1.0), name="push")
+    recording = sb.Recording(positions=np.zeros((len(TIMES), 1, 3)), times=TIMES, name="seen")
+    e = sb.Experiment(scene=scene, recording=recording, markers=sb.on_body(body, [(0, 0, 0)]), solver=SOLVER)
+    problem = FitProblem([e], as_parameters(["block_mass"], [e]))
+    names = {one.name for one in told_numbers(problem, problem.parameters.initial())[0]}
+    assert "push_z" in names and "load_direction" in names and "load_size" not in names
+    clamped = sb.rope(0.4, 8, density=0.05, EI=1e-3, bend_damping=0.02, clamp_start=(1, 0, 0))
+    assert not told_of(problem_of(clamped, simulated(clamped)), "grip_direction")
+    own = {"density": 0.05, "EI": 1e-3, "bend_damping": 0.02, "tilts": True}
+    tilted = sb.rope(0.4, 8, grip_start=hand(), points=LINE, pinned=(), **own)
+    assert not told_of(problem_of(tilted, simulated(tilted)), "grip_direction")
+
+
+def test_standard_deviations_count() -> None:
+    base = loaded()
+    problem = problem_of(base, simulated(base))
+    u = problem.parameters.initial()
+    told, _ = told_numbers(problem, u)
+    found = premises(problem, u, {"load_direction": 0.01, "load_size": 0.02}, told)
+    by = {p.name: p for p in found}
+    assert by["loads about y"].sd == 0.01 and by["size of the loads"].sd == 0.02
+    assert by["loads about y"].words == "1 degree" and by["size of the loads"].words == "1 %"
+    exact = premises(problem, u, {"load_direction": 0.0, "load_size": 0.0}, told)
+    assert not {p.name for p in exact} & {"loads about y", "size of the loads"}
+
+
+def test_a_tool_that_is_turned_against_its_poses_is_named() -> None:
+    """Bend damping was 18 % off, 1.8 half-widths, and "identified"."""
+    times = np.arange(0, 46) / 50
+    shown = simulated(swung_rope("y", 2.0 * DEGREE), times)
+    shown += 5e-4 * np.random.default_rng(1).standard_normal(shown.shape)
+    scene = swung_rope()
+    recording = sb.Recording(positions=shown, times=times, name="seen")
+    places = [sb.on_particle(int(p)) for p in scene.ropes["rope"].particles[2:-1]]
+    e = sb.Experiment(scene=scene, recording=recording, markers=places, solver=SOLVER, sigma=5e-4)
+    found = sb.fit(e, parameters=FITTED, profiles=False)
+    assert any("the grip at rope_start were turned by" in words for words in found.result.warnings)
+    assert any(p.name == "rope_start about y" for p in found.result.premises)
+
+
+def test_words() -> None:
+    problem = problem_of(thrown(), simulated(thrown()))
+    (speed,) = told_of(problem, "start_speed").values()
+    assert words_of(speed, 0.03, problem, [0]) == "the motion had started 3 % faster"
+    problem = problem_of(loaded(), simulated(loaded()))
+    (size,) = told_of(problem, "load_size").values()
+    assert words_of(size, -0.02, problem, [0]) == "the loads were 2 % smaller"
+    about = told_of(problem, "load_direction")["loads about y"]
+    assert words_of(about, -DEGREE, problem, [0]) == "the loads were turned by 1 degrees about -y"
