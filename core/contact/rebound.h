@@ -18,7 +18,7 @@
 namespace sheetbend {
 
 // A contact that lifts is so many times stiffer than a rigid one. It gives way by its push over its stiffness. A share of that, which depends on s, is lost
-// in velocity, and the gradient with respect to the time of the impact has 1/h of it: with 100 that of a ball in docs/contact.md is 2 % off at 1 ms.
+// in velocity, and the gradient with respect to the time of the impact has 1/h of it: with 100 that of a ball in docs/contact_law.md is 2 % off at 1 ms.
 inline constexpr double firmness = 1e3;
 
 inline constexpr double no_return = 1e-9;  // of a carried force, that rounding may leave along the normal

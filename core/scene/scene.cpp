@@ -128,23 +128,7 @@ void add_bodies(const SceneSpec& spec, Scene& s) {
   for (int n = 0; n < s.nodes(); ++n) s.has_weight.push_back(s.inertial[n] && s.is_place[n]);
 }
 
-}  // namespace
-
-int kind_of(const std::string& name) {
-  int found = -1;
-  std::string known;
-  for (int kind = 0; kind < kind_count; ++kind)
-    with_kind(kind, [&]<class K>(K) {
-      if (name == K::name) found = kind;
-      known += (kind ? ", " : "") + std::string(K::name);
-    });
-  if (found < 0) refuse("kind: no constraint is called '" + name + "'. Fix: use one of " + known);
-  return found;
-}
-
-Scene build_scene(const SceneSpec& spec) {
-  if (spec.particles <= 0) refuse("particles: the scene is empty. Fix: add particles");
-  Scene s;
+void add_nodes(const SceneSpec& spec, Scene& s) {
   s.fields.add("position", 3, spec.particles);
   s.role.assign(s.nodes(), Role::free);
   for (const Field& field : s.fields.list)
@@ -157,6 +141,9 @@ Scene build_scene(const SceneSpec& spec) {
   check_nodes("loaded", spec.loaded, s.nodes());
   for (const int n : spec.pinned) s.role[n] = Role::pinned;
   for (const int n : spec.driven) s.role[n] = Role::driven;
+}
+
+void add_directors(const SceneSpec& spec, Scene& s) {
   for (const Director& d : spec.directors) check_nodes("directors", {d.node, d.tail, d.head}, s.nodes());
   s.directors = spec.directors;
   s.is_director.assign(s.nodes(), false);
@@ -173,7 +160,10 @@ Scene build_scene(const SceneSpec& spec) {
     s.inertial.push_back(s.role[n] == Role::free && !s.is_director[n]);
     s.is_place.push_back(!s.is_director[n]);
   }
-  add_bodies(spec, s);
+}
+
+// What changes over time: driven nodes, forces, and the wind on triangles.
+void add_knots(const SceneSpec& spec, Scene& s) {
   for (const int n : spec.loaded)
     if (s.is_director[n] && s.role[n] == Role::free)
       refuse("loaded: node " + std::to_string(n) + " is a director. Fix: let forces act on particles");
@@ -192,7 +182,10 @@ Scene build_scene(const SceneSpec& spec) {
   s.wind = spec.wind;
   check_triangles("air", s.air, s);
   check_knots("wind_times", s.wind, !s.air.empty());
+}
 
+// Returns how many values the parameters of all constraints are.
+std::size_t add_groups(const SceneSpec& spec, Scene& s) {
   std::size_t values = 0;
   for (const GroupSpec& g : spec.groups) {
     s.groups.push_back(build_group(g, s));
@@ -213,12 +206,34 @@ Scene build_scene(const SceneSpec& spec) {
     s.stencil_coordinates += static_cast<std::size_t>(built.count) * 3 * built.arity;
     s.gradient_entries += static_cast<std::size_t>(built.count) * 3 * built.arity * built.rows;
   }
+  return values;
+}
 
+}  // namespace
+
+int kind_of(const std::string& name) {
+  int found = -1;
+  std::string known;
+  for (int kind = 0; kind < kind_count; ++kind)
+    with_kind(kind, [&]<class K>(K) {
+      if (name == K::name) found = kind;
+      known += (kind ? ", " : "") + std::string(K::name);
+    });
+  if (found < 0) refuse("kind: no constraint is called '" + name + "'. Fix: use one of " + known);
+  return found;
+}
+
+Scene build_scene(const SceneSpec& spec) {
+  if (spec.particles <= 0) refuse("particles: the scene is empty. Fix: add particles");
+  Scene s;
+  add_nodes(spec, s);
+  add_directors(spec, s);
+  add_bodies(spec, s);
+  add_knots(spec, s);
+  const std::size_t values = add_groups(spec, s);
   find_turning(s);
   add_loads(spec, s);
-
   for (const VolumeSpec& v : spec.volumes) s.volumes.push_back(build_volume(v, s));
-
   const auto [frictions, radii, stiffnesses, poses, sizes, restitutions, weights, dissipations] = add_contacts(spec, s);
 
   const std::size_t dofs = s.dofs(), nodes = s.nodes(), m = s.constraints;

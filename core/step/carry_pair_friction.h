@@ -77,7 +77,7 @@ struct CarryPairFriction {
 
   [[noreturn]] static void refuse(const DirectBlock& block, const BlockPair& pair, std::size_t places) {
     throw Unbalanced("more than " + std::to_string(places) + " pairs touch with friction",
-                     "give self_contact(pairs=...) as many as may touch at a time", 0, 0.0,
+                     "give add_self_contact(pairs=...) as many as may touch at a time", 0, 0.0,
                      block.particles[block.surface.whole(pair.spots[0])]);
   }
 };

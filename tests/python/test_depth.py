@@ -44,7 +44,7 @@ def deepest(scene: sb.Scene, solver: sb.Solver = SOLVER) -> float:
 def test_a_rope_at_rest_lies_as_deep_as_its_contact_is_stiff(integrator: Literal["bdf1", "bdf2"], lift: float) -> None:
     scene, solver = rope(lift=lift), replace(SOLVER, integrator=integrator)
     end = sb.simulate(scene, TIMES, solver).positions[-1, :, 2]
-    rest = GRAVITY * SOLVER.h**2 / 1000  # docs/contact.md
+    rest = GRAVITY * SOLVER.h**2 / 1000  # docs/contact_law.md
     assert RADIUS + lift - end == pytest.approx(rest, rel=1e-2)
     assert rest < deepest(scene, solver) < 20 * rest + 2 * lift / 0.1 * SOLVER.h / 1000
 

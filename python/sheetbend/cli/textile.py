@@ -101,45 +101,66 @@ def textile(
     """
 
     def command(console: Console) -> Outcome:
-        columns, units = _pairs("--column", column), _pairs("--unit", unit)
-        at, across = _size("--length", length), _size("--width", width)
-        with options(columns="--column", units="--unit", decimal="--decimal", length="--length", width="--width"):
-            curves = [
-                curve
-                for file in files
-                for curve in read_curves(
-                    file, test=test, length=at, width=across, columns=_numbered(columns), units=units, decimal=decimal
-                )
-            ]
+        curves = _read(files, test, length, width, column, unit, decimal)
         if pretension is not None:
             curves = [c.from_pretension(_pretension(pretension, c)) for c in curves]
-        if len({c.name for c in curves}) < len(curves):
-            curves = [replace(c, name=f"{k} {c.name}") for k, c in enumerate(curves, start=1)]
-        folder = output if output is not None else Path("out") / files[0].stem
-        check_targets("--output", folder, [folder / name for name in ("report.txt", "mean.csv", f"curves.{figures}")])
-        made("--output", folder)
-        fitted = test == "tension" and law != "none"
-        fit = (
-            fit_pull(curves, along, law, weights=_weights(weights), way=way, cycle=cycle, poisson=poisson)
-            if fitted
-            else None
-        )
+        curves = _told_apart(curves)
+        folder = _folder(output, files[0], figures)
+        fit = None
+        if test == "tension" and law != "none":
+            fit = fit_pull(curves, along, law, weights=_weights(weights), way=way, cycle=cycle, poisson=poisson)
         further = forecast_pull(curves, way=way, cycle=cycle) if forecast else None
         text = report(curves, fit, cycle) + ("" if further is None else f"\n{further}\n")
         console.print("\n" + text, soft_wrap=True, end="")
-        write_text(folder / "report.txt", text)
         mean = mean_curve(curves, way, cycle=cycle)
+        write_text(folder / "report.txt", text)
         write_mean(curves[0].test, mean, folder / "mean.csv")
-        drawn = write_figure(curves, mean, way, fit, along, figures, folder)
-        written = ["report.txt", "mean.csv", *drawn]
+        written = ["report.txt", "mean.csv", *write_figure(curves, mean, way, fit, along, figures, folder)]
         console.print(f"\nwritten to {folder}: {', '.join(written)}", soft_wrap=True)
-        unknown = fit is not None and all(e.verdict == "not identifiable" for e in fit.estimates)
         data = {"output": str(folder), "files": written} | to_dict(curves, fit, cycle)
         if further is not None:
             data["forecast"] = further.to_dict()
+        unknown = fit is not None and all(e.verdict == "not identifiable" for e in fit.estimates)
         return Outcome(data, Code.NOT_IDENTIFIABLE if unknown else Code.DONE)
 
     run(command, json)
+
+
+def _read(
+    files: Sequence[Path],
+    test: Test,
+    length: str | None,
+    width: str | None,
+    column: Sequence[str] | None,
+    unit: Sequence[str] | None,
+    decimal: str | None,
+) -> list[Curve]:
+    """The curves of all files."""
+    columns, units = _numbered(_pairs("--column", column)), _pairs("--unit", unit)
+    at, across = _size("--length", length), _size("--width", width)
+    with options(columns="--column", units="--unit", decimal="--decimal", length="--length", width="--width"):
+        return [
+            curve
+            for file in files
+            for curve in read_curves(
+                file, test=test, length=at, width=across, columns=columns, units=units, decimal=decimal
+            )
+        ]
+
+
+def _told_apart(curves: list[Curve]) -> list[Curve]:
+    """Curves with numbers before their names, where two have the same name."""
+    if len({c.name for c in curves}) == len(curves):
+        return curves
+    return [replace(c, name=f"{k} {c.name}") for k, c in enumerate(curves, start=1)]
+
+
+def _folder(output: Path | None, file: Path, figures: Form) -> Path:
+    """The folder of the results, made, in which nothing of theirs is a folder or may not be written."""
+    folder = output if output is not None else Path("out") / file.stem
+    check_targets("--output", folder, [folder / name for name in ("report.txt", "mean.csv", f"curves.{figures}")])
+    made("--output", folder)
+    return folder
 
 
 def _pairs(option: str, given: Sequence[str] | None) -> dict[str, str]:

@@ -139,8 +139,8 @@ class ContactSection(Section):
 
 class SelfContactSection(Section):
     """[scene.self_contact]: ropes, cloths and bodies that touch themselves and each other, `Scene.add_self_contact`
-    (docs/contact.md). It needs method = "implicit" in [solver]. The radius is the quantity self_contact_radius (m), or
-    self_contact_radius_0 and so on where there are several, and the friction is self_friction."""
+    (docs/self_contact.md). It needs method = "implicit" in [solver]. The radius is the quantity self_contact_radius
+    (m), or self_contact_radius_0 and so on where there are several, and the friction is self_friction."""
 
     of: Name | list[Name] | None = key(
         None, "a rope, a cloth or a body with `capsules`, or several; all of the scene when left out"

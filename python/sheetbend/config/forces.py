@@ -10,7 +10,7 @@ from ..recording.force_recording import ForceRecording
 from ..scene.scene import Scene
 from . import schema
 from .errors import located
-from .scenes import Particles
+from .particles import Particles
 
 FIELDS = (
     *("sigma", "torque_sigma", "axes", "torque_axes", "reads", "quaternion", "arm", "average", "bias", "torque_bias"),

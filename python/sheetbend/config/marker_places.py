@@ -17,11 +17,11 @@ from . import schema
 from .bodies import named_body
 from .cloth_markers import places_on_cloths
 from .errors import located
+from .particles import Particles
 from .rope_points import Seats
 from .rope_schema import Rod, Rope
 from .ropes import check_markers
 from .scene_schema import SceneSection
-from .scenes import Particles
 from .solids import named_solid
 
 

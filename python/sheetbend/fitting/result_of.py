@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from ..minimum.fine_meshes import at_the_limit
 from ..minimum.smooth import Field
 from ..report.dependence import with_dependences
 from ..report.fit_result import FitResult
+from ..result.motions import RecordingFit
 from .conclusion import Conclusion
 from .reached import Reached
 from .rows import curves, every_end, given_rows, growth_rows, recording_fit, start_rows
@@ -75,29 +77,17 @@ def result_of(
         fields: of stiffness, with their priors.
         interrupted: by Ctrl-C, at any time.
     """
-    problem, best, ends, found = reached.problem, reached.best, reached.ends, reached.found
+    problem, best, found = reached.problem, reached.best, reached.found
     at, judged, drawn = conclusion.at, conclusion.judged, conclusion.bootstrap
-    fitted, parameters = problem.experiments, problem.parameters
-    rows = problem.core.first_rows
-    count = {e.name: rows[i + 1] - rows[i] for i, e in enumerate(fitted)}
-    starts = {e.name: start_moved(e, at.problem.starts(at.u)[e.name]) for e in fitted if e.start == "estimated"}
-    errors = tuple(recording_fit(c, count, left_out, corrected, starts) for c in comparisons)
-    other_starts = [Elsewhere(m.cost - best.cost, parameters.to_physical(m.u), "another start") for m in ends[1:]]
+    parameters = problem.parameters
+    errors = _recordings(reached, conclusion, comparisons, left_out, corrected)
     stopped, ahead = unfinished(problem, best, judged)
     missed = unexplained(problem, comparisons, judged.autocorrelation_time, at.u)
-    contradicted = (
-        held_out_motion(problem, comparisons, errors)
-        | elsewhere(problem, judged, best.cost, [*other_starts, *conclusion.lower])
-        | conclusion.contradicted
-        | missed
-        | stopped
-    )
+    contradicted = _contradicted(reached, conclusion, comparisons, errors) | missed | stopped
     estimates, limit = at_the_limit(doubtful(judged.estimates, contradicted, missed), at.refits, parameters, at.u)
     values = conclusion.values | parameters.to_physical(limit)
-    each = every_end(ends, found.raced)
-    evaluations, jacobians = sum(m.evaluations for m in ends), sum(m.jacobians for m in ends)
-    all_evaluations, all_jacobians = clock.since()
-    baselines = (c.baseline_words for c in (*comparisons, *left_out.values()) if c.baseline_words)
+    each = every_end(reached.ends, found.raced)
+    effort = _effort(reached, clock)
     contacts = what_touches(at.problem, at.u)
     warnings = (
         *warnings_of([m for m, _ in each], interrupted, problem, estimates, ahead),
@@ -107,6 +97,7 @@ def result_of(
         *outside(conclusion.experiments, conclusion.values),
         *(() if interrupted else (*misread(problem, best.u), *implausible(problem))),
     )
+    baselines = (c.baseline_words for c in (*comparisons, *left_out.values()) if c.baseline_words)
     result = FitResult(
         estimates=estimates,
         recordings=told_clocks(errors, conclusion.experiments, conclusion.values, estimates),
@@ -141,9 +132,53 @@ def result_of(
         fields=field_fits(at.problem, at.u, fields),
         kinks=() if interrupted else kinks(at.problem, at.u, estimates),
         windows=best.windows,
-        evaluations=evaluations,
-        jacobians=jacobians,
-        judging=(all_evaluations - evaluations, all_jacobians - jacobians),
+        evaluations=effort.evaluations,
+        jacobians=effort.jacobians,
+        judging=effort.judging,
         warnings=warnings,
     )
     return replace(result, estimates=with_dependences(result))
+
+
+def _recordings(
+    reached: Reached,
+    conclusion: Conclusion,
+    comparisons: Sequence[Comparison],
+    left_out: Mapping[str, Comparison],
+    corrected: Mapping[str, np.ndarray],
+) -> tuple[RecordingFit, ...]:
+    """The errors of each recording."""
+    at, fitted, rows = conclusion.at, reached.problem.experiments, reached.problem.core.first_rows
+    count = {e.name: rows[i + 1] - rows[i] for i, e in enumerate(fitted)}
+    starts = {e.name: start_moved(e, at.problem.starts(at.u)[e.name]) for e in fitted if e.start == "estimated"}
+    return tuple(recording_fit(c, count, left_out, corrected, starts) for c in comparisons)
+
+
+def _contradicted(
+    reached: Reached, conclusion: Conclusion, comparisons: Sequence[Comparison], errors: Sequence[RecordingFit]
+) -> dict[str, str]:
+    """By parameter, what other data, other starts, and other parts of the data ask for."""
+    problem, best = reached.problem, reached.best
+    other_starts = [
+        Elsewhere(m.cost - best.cost, problem.parameters.to_physical(m.u), "another start") for m in reached.ends[1:]
+    ]
+    return (
+        held_out_motion(problem, comparisons, errors)
+        | elsewhere(problem, conclusion.judged, best.cost, [*other_starts, *conclusion.lower])
+        | conclusion.contradicted
+    )
+
+
+class _Effort(NamedTuple):
+    """How many evaluations and Jacobians the searches took, and how many of both what follows from them."""
+
+    evaluations: int
+    jacobians: int
+    judging: tuple[int, int]
+
+
+def _effort(reached: Reached, clock: Clock) -> _Effort:
+    """Up to now."""
+    searches = sum(m.evaluations for m in reached.ends), sum(m.jacobians for m in reached.ends)
+    evaluations, jacobians = clock.since()
+    return _Effort(*searches, (evaluations - searches[0], jacobians - searches[1]))

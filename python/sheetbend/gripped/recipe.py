@@ -29,14 +29,14 @@ from .climb import Climb
 from .conclusion import announced, conclude
 from .judging import predict
 from .ladder import LADDER, Rung
-from .model import GRAVITY, NAME, RopeModel, nominal_directions, shared_gravity
+from .model import NAME, RopeModel, nominal_directions
 from .motion import Array, GrippedMotion, motions_of
 from .over_density import UNIT, as_quantities, named_over_density, over_density, said_over_density
-from .plausible import doubts, gravities
+from .plausible import doubts
+from .read import Read, read
 from .rolls import rolls_said
-from .screening import screened
+from .said import found_gravity, found_late, short_links
 from .search import Say, Search
-from .slips import held, slips, slips_said
 from .start import started
 from .steps import Step
 from .windows import SPANS, Span, everything
@@ -44,7 +44,6 @@ from .windows import SPANS, Span, everything
 BENDING_LENGTHS = (0.45, 0.25, 0.12)  # m, of the starts: (EI/(density g))^(1/3), stiff first
 DENSITY, MARKERS = f"{NAME}_density", "marker_mass"
 MARKERS_UNKNOWN = 0.08  # of the rope's mass, standard deviation of that of markers of which nothing is known
-LINKS_PER_BENDING_LENGTH = 3.0  # below this EI reads too high and GJ too low
 
 
 @dataclass(frozen=True)
@@ -149,6 +148,46 @@ def fit_rope(
         SheetbendError: every start diverges.
         KeyboardInterrupt: before the first rung was finished.
     """
+    _check(recordings, density, marker_mass, starts, validate)
+    if density is None:
+        say = said_over_density(say)
+    seen = read(recordings, smoothing, gravity)
+    for words in seen.said:
+        say(words)
+    model = RopeModel(
+        density=UNIT if density is None else density,
+        nominal=nominal_directions(seen.motions)
+        if nominal is None
+        else (unit_vector("nominal", nominal[0]), unit_vector("nominal", nominal[1])),
+        values={},
+        marker_mass=marker_mass or 0.0,
+        segments=segments,
+        substeps=substeps,
+        smoothing=smoothing,
+        sigma=sigma,
+        gravity=seen.gravities[0],
+    )
+    spans: Sequence[Span] = SPANS if isinstance(windows, str) else windows
+    if isinstance(windows, str):
+        begun = started(model, seen.motions, bending_lengths[0])
+        say(announced(begun, ladder, seen.motions, everything(seen.motions, spans[-1][0]), threads))
+    climb = Climb(Search(seen.motions, validate, spans, threads, say))
+    models = [replace(model, gravity=g) for g in seen.gravities]
+    interrupted = _climb(climb, models, ladder, bending_lengths, max_segments, starts)
+    last = everything(climb.search.whole, spans[-1][0]) if isinstance(windows, str) else spans[-1]
+    found, spread = conclude(climb, climb.search.whole, last, _given(given, marker_mass), interrupted)
+    fitted = _fitted(climb, found, spread, seen, last)
+    return fitted if density is not None else _over_density(fitted)
+
+
+def _check(
+    recordings: Sequence[Recording | GrippedMotion],
+    density: float | None,
+    marker_mass: float | None,
+    starts: int | None,
+    validate: float,
+) -> None:
+    """Raises InputError where a number is none that it could be."""
     if density is not None and not (np.isfinite(density) and density > 0):
         fix = "weigh the rope and give kg/m, or leave it out: then EI/density is fitted"
         raise InputError("density", "must be positive", density, fix)
@@ -163,101 +202,64 @@ def fit_rope(
         check_count(starts)
     if not 0 <= validate < 1:
         raise InputError("validate", "must be a share below 1", validate, "give such as 0.25")
-    if density is None:
-        say = said_over_density(say)
-    usable = screened(recordings, smoothing)
-    slipped = [slips(m) for m in usable]
-    motions = [held(m, found) for m, found in zip(usable, slipped, strict=True)]
-    told_slips = [words for m, found in zip(usable, slipped, strict=True) for words in slips_said(m, found)]
-    notes = (*usable.notes, *told_slips)
-    told = shared_gravity([m.recording for m in motions])
-    meant = (gravity,) if gravity is not None else (GRAVITY,) if told is not None else gravities(motions)
-    for note in notes:
-        say(note)
-    for doubt in doubts(motions, meant[-1]):
-        say(f"doubtful: {doubt}")
-    model = RopeModel(
-        density=UNIT if density is None else density,
-        nominal=nominal_directions(motions)
-        if nominal is None
-        else (unit_vector("nominal", nominal[0]), unit_vector("nominal", nominal[1])),
-        values={},
-        marker_mass=marker_mass or 0.0,
-        segments=segments,
-        substeps=substeps,
-        smoothing=smoothing,
-        sigma=sigma,
-        gravity=meant[0],
-    )
-    spans: Sequence[Span] = SPANS if isinstance(windows, str) else windows
-    if isinstance(windows, str):
-        begun = started(model, motions, bending_lengths[0])
-        say(announced(begun, ladder, motions, everything(motions, spans[-1][0]), threads))
-    climb, interrupted = Climb(Search(motions, validate, spans, threads, say)), False
+
+
+def _climb(
+    climb: Climb,
+    models: Sequence[RopeModel],
+    ladder: Sequence[Rung],
+    bending_lengths: Sequence[float],
+    max_segments: int,
+    starts: int | None,
+) -> bool:
+    """Go up the ladder; returns whether Ctrl-C ended it, after the first rung."""
     try:
-        climb.run([replace(model, gravity=g) for g in meant], ladder, bending_lengths, max_segments, starts)
+        climb.run(models, ladder, bending_lengths, max_segments, starts)
     except KeyboardInterrupt:
         if climb.rope is None:
             raise
-        interrupted = True
         climb.gather()
-        say(f"interrupted: going back to {next(s.name for s in reversed(climb.steps) if s.stays)}")
-    kept = climb.search.whole
-    last = everything(kept, spans[-1][0]) if isinstance(windows, str) else spans[-1]
-    sds = {MARKERS: 0.0, **(given or {})}  # which the model has, or the density
+        climb.search.say(f"interrupted: going back to {next(s.name for s in reversed(climb.steps) if s.stays)}")
+        return True
+    return False
+
+
+def _given(given: Mapping[str, float] | None, marker_mass: float | None) -> dict[str, float]:
+    """Standard deviations of what is given: of markers, whose mass the model has or the density, and of the density."""
+    sds = {MARKERS: 0.0, **(given or {})}
     if marker_mass is None:
         sds[DENSITY] = math.hypot(sds.get(DENSITY, 0.0), MARKERS_UNKNOWN)
-    found, spread = conclude(climb, kept, last, sds, interrupted)
+    return sds
+
+
+def _fitted(climb: Climb, found: Fit, spread: Mapping[str, float], seen: Read, last: Span) -> RopeFit:
+    """The rope where the climb ended, with what a reader must know of it."""
+    assert climb.rope is not None
     if climb.raced:
         found = replace(found, result=replace(found.result, starts=climb.raced))
-    assert climb.rope is not None
     rope, values = climb.rope, {**found.values, **found.on_mesh}  # of the model's own mesh
+    model, kept = rope.model, climb.search.whole
     warnings = (
-        *notes,
-        *doubts(motions, rope.model.gravity),
-        *_found_gravity(rope.model, meant),
-        *_found_late(climb.late),
-        *([rolls_said(NAME, kept, rope.model.nominal, values)] if rope.model.rolls else []),
+        *seen.notes,
+        *doubts(seen.motions, model.gravity),
+        *found_gravity(model, seen.gravities),
+        *found_late(climb.late),
+        *([rolls_said(NAME, kept, model.nominal, values)] if model.rolls else []),
         *climb.search.left_out,
-        *at_bounds(rope.parameters, values, rope.model, kept, last[0]),
-        *_short_links(rope.model, values),
+        *at_bounds(rope.parameters, values, model, kept, last[0]),
+        *short_links(model, values),
     )
-    model = replace(rope.model.at(values), beside=climb.beside, late=climb.late)
-    if density is None:
-        result = over_density(found.result)
-        found, values = replace(found, result=result), named_over_density(values, result)
-        spread = named_over_density(spread, result)
-    return RopeFit(model, values, tuple(climb.steps), found, warnings, density is not None, spread)
+    model = replace(model.at(values), beside=climb.beside, late=climb.late)
+    return RopeFit(model, values, tuple(climb.steps), found, warnings, spread=spread)
 
 
-def _found_gravity(model: RopeModel, meant: Sequence[Sequence[float]]) -> list[str]:
-    """A gravity that was chosen."""
-    if len(meant) < 2 or model.gravity == meant[0]:
-        return []
-    along = ", ".join(f"{g:.3g}" for g in model.gravity)
-    return [f"no gravity is given; it is taken as [{along}] m/s^2, since the rope sags along it and moves as it asks"]
-
-
-def _found_late(late: float) -> list[str]:
-    """Grips whose markers come late."""
-    if not late:
-        return []
-    when = "after" if late > 0 else "before"
-    taken = "earlier" if late > 0 else "later"
-    return [
-        f"the markers of the grips come {1e3 * abs(late):.3g} ms {when} the others, and the grips are taken as so much "
-        f"{taken}; if one clock stamps all markers, the model lacks something else"
-    ]
-
-
-def _short_links(model: RopeModel, values: Mapping[str, float]) -> list[str]:
-    """Links that are long beside the bending length."""
-    EI, length = values[f"{NAME}_EI"], values[f"{NAME}_length"]
-    bending = (EI / (model.density * 9.81)) ** (1 / 3)
-    links = bending / (length / model.segments)
-    if links >= LINKS_PER_BENDING_LENGTH:
-        return []
-    return [
-        f"a bending length ({1e3 * bending:.3g} mm) holds only {links:.2g} links: EI may read up to two times too high "
-        "and GJ too low; raise max_segments"
-    ]
+def _over_density(fitted: RopeFit) -> RopeFit:
+    """A fit at 1 kg/m of a rope that was not weighed, with the names of what it tells."""
+    result = over_density(fitted.fit.result)
+    return replace(
+        fitted,
+        fit=replace(fitted.fit, result=result),
+        values=named_over_density(fitted.values, result),
+        spread=named_over_density(fitted.spread, result),
+        weighed=False,
+    )

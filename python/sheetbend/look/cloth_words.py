@@ -81,8 +81,20 @@ def _row(hold: Hold) -> str:
 
 
 def unknown_of(s: Seen, sheets: Sequence[Sheet], measured: Measured) -> list[str]:
+    """What is not known, and what stands in its place."""
     held = [hold for sheet in sheets for hold in sheet.held]
     windy = any(sheet.wind is not None for sheet in sheets)
+    return [
+        *_of_holding(held),
+        *_of_size(sheets, held),
+        *_of_stiffness(sheets, windy),
+        _of_air(windy),
+        _of_density(measured),
+        *_of_holders_motion(s, held),
+    ]
+
+
+def _of_holding(held: Sequence[Hold]) -> list[str]:
     said = []
     if any(hold.own and not hold.corners for hold in held):
         said.append(
@@ -94,11 +106,15 @@ def unknown_of(s: Seen, sheets: Sequence[Sheet], measured: Measured) -> list[str
             "single vertices comes out too soft. Measure the patches, give each set their `radius`, and take smaller "
             "cells. One marker also does not show how a hand turns its patch: name two of each hand in its grip"
         )
-    said.append(
+    return said
+
+
+def _of_size(sheets: Sequence[Sheet], held: Sequence[Hold]) -> list[str]:
+    said = [
         "the size of the flat fabric: distances are taken as it hangs, stretched by its weight and the air. If that is "
         "1 %, the lowest markers are off by 1 % of the height, and the fitted tension is too stiff. Measure the edges "
-        "and the markers on the flat cloth, and which way its warp runs, and correct mesh, origin and markers"
-    )
+        "and the markers on the flat cloth, and which way its warp runs, and correct mesh, origin and markers",
+    ]
     for hold in held:
         if hold.margin is not None and hold.margin.edge is None:
             said.append(
@@ -117,6 +133,11 @@ def unknown_of(s: Seen, sheets: Sequence[Sheet], measured: Measured) -> list[str
         f"how far the cloth goes on beyond its other outer markers: {part}, and its weight and the air on it count. "
         "Measure it with a ruler, and correct `width`, `height`, `origin` and the markers' places"
     )
+    return said
+
+
+def _of_stiffness(sheets: Sequence[Sheet], windy: bool) -> list[str]:
+    said = []
     if windy:
         said.append(
             "how much the cloth is stretched: its flat size along warp and weft is fitted beside the tension, with a "
@@ -133,23 +154,33 @@ def unknown_of(s: Seen, sheets: Sequence[Sheet], measured: Measured) -> list[str
         )
     if not windy and not all(sheet.slung for sheet in sheets):
         said.append("the stiffness in tension: a hanging cloth hardly shows it. warp and shear are not fitted")
-    said.append(
+    return said
+
+
+def _of_air(windy: bool) -> str:
+    return (
         "how strongly the air acts at the start: `air_normal` begins with the value of a plate; a steady wind "
         "shows it only together with the wind's speed"
         if windy
         else "the wind: the air is taken to stand still, and `air_tangential`, its friction along the cloth, is a guess"
     )
-    said.append(
+
+
+def _of_density(measured: Measured) -> str:
+    return (
         "the density: 0.2 kg/m^2 is assumed, and all other values are proportional to it. The intervals allow for 50 % "
         "of it (`[given]`): measure it, and give --density"
         if measured.density is None
         else "the mass of the markers"
     )
-    if any(hold.moves and hold.own and hold.tool is None for hold in held):
-        rows = "the upper row's noise" if len(held) == 1 and held[0].side == "top" else "their noise"
-        said.append(
-            f"the true motion of the holder: {rows}, {1e3 * s.noise:.2g} mm in each coordinate, shakes "
-            "the cloth, and the prediction is worse for it. Give the holder's own markers, or a robot's "
-            'poses with --poses; or add `driven_sigma = "estimate"` to [[recording]], which takes many times as long'
-        )
-    return said
+
+
+def _of_holders_motion(s: Seen, held: Sequence[Hold]) -> list[str]:
+    if not any(hold.moves and hold.own and hold.tool is None for hold in held):
+        return []
+    rows = "the upper row's noise" if len(held) == 1 and held[0].side == "top" else "their noise"
+    return [
+        f"the true motion of the holder: {rows}, {1e3 * s.noise:.2g} mm in each coordinate, shakes "
+        "the cloth, and the prediction is worse for it. Give the holder's own markers, or a robot's "
+        'poses with --poses; or add `driven_sigma = "estimate"` to [[recording]], which takes many times as long'
+    ]

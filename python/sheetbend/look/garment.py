@@ -64,7 +64,8 @@ def draft_of_mesh(path: Path, file: str, name: str, measured: Measured, units: s
         "the fabric: the numbers of a light woven cotton are assumed. `sheetbend fabric` finds those of a fabric from "
         "tests, and `fabric_file` takes them",
         "the warp: it is taken to run upward. Give texture coordinates in meters, or change `warp`",
-        "the body in it: nothing touches the fabric, and it does not touch itself. docs/contact.md has both",
+        "the body in it: nothing touches the fabric, and it does not touch itself. docs/contact.md and "
+        "docs/self_contact.md have both",
     ]
     given = {} if measured.density is None else {"density": measured.density}
     cloth: dict[str, Any] = {"name": "cloth"} | COTTON | DAMPING | given

@@ -143,8 +143,7 @@ def gripping(s: Seen) -> set[int]:
 
 def held(s: Seen, hands: Hands, order: tuple[int, ...]) -> Held:
     """What holds a rope that moves, whose markers are given in order."""
-    r = s.recording
-    names, still, clamped = r.markers, set(s.still), gripping(s)
+    still, clamped = set(s.still), gripping(s)
     found = Held(order)
     ends = {"start": order[0], "end": order[-1]}
     taken = [at for at, k in ends.items() if k in still or k in clamped]
@@ -155,56 +154,73 @@ def held(s: Seen, hands: Hands, order: tuple[int, ...]) -> Held:
     if not taken and not by_hand:
         taken = [_guessed(s, found)]
     for at in taken:
-        k, way = ends[at], order if at == "start" else order[::-1]
-        stays, along = _direction_stays(r.positions, way)
-        direction = snapped(along if at == "start" else -along)
-        within = _clamped_until(s, way) if k in still else 0
-        if within:
-            outward = r.positions[:, way[within]] - r.positions[:, k]
-            outward = np.nanmean(outward, axis=0) / np.linalg.norm(np.nanmean(outward, axis=0))
-            found.rope[f"clamp_{at}"] = snapped(outward if at == "start" else -outward)
-            found.order = tuple(j for j in found.order if j not in way[:within])
-            found.notes.append(
-                f"{joined(names[j] for j in way[: within + 1])} stay in place: a clamp, and the rope is free from "
-                f"{names[way[within]]} on"
-            )
-            found.unknown.append(
-                f"where the clamp ends: the rope is taken to be free from {names[way[within]]} on. EI goes with the "
-                "third or fourth power of the free length: measure from where the clamp ends, and correct `markers`"
-            )
-        elif k in still:
-            if stays:
-                found.rope[f"clamp_{at}"] = direction
-                found.notes.append(f"{names[k]} stays in place and the rope keeps its direction there: a clamp")
-            else:
-                found.rope.setdefault("pinned", []).append(0 if at == "start" else -1)
-                found.notes.append(f"{names[k]} stays in place and the rope turns there: it is pinned")
+        way = order if at == "start" else order[::-1]
+        if way[0] in still:
+            _still_end(s, found, at, way)
         elif way[1] in clamped:
-            pair = [names[j] for j in (way[:2] if at == "start" else way[1::-1])]
-            found.grips.append({"at": at, "markers": pair, "smoothing": SMOOTHING})
-            found.order = tuple(j for j in found.order if j != k)
-            found.notes.append(
-                f"{pair[0]} and {pair[1]} are gripped: they give the place and the direction, and the rope is free "
-                f"from {names[way[1]]} on"
-            )
-            found.unknown.append(f"whether the rope runs through {pair[0]} and {pair[1]}, as it is taken to do")
+            _gripped_end(s, found, at, way)
         else:
-            grip: dict[str, Any] = {"at": at, "markers": [names[k]], "smoothing": ALONE}
-            if stays:
-                grip["direction"] = direction
-                found.notes.append(
-                    f"{names[k]} moves the rope, which keeps its direction there: the hand does not turn"
-                )
-            else:
-                found.alone.append(names[k])
-                found.notes.append(f"{names[k]} moves the rope, which turns there")
-                found.unknown.append(
-                    f"whether the hand turns the rope at {names[k]}: one marker gives no direction, so the end turns "
-                    "freely. If it is gripped firmly, record a second marker in the hand, and name both in `markers`"
-                )
-            found.grips.append(grip)
+            _led_end(s, found, at, way)
     _clamp_angles(s, found)
     return found
+
+
+def _still_end(s: Seen, found: Held, at: str, way: tuple[int, ...]) -> None:
+    """An end that stays: in a clamp that reaches over some markers, in one at the first marker, or pinned."""
+    x, names = s.recording.positions, s.recording.markers
+    within = _clamped_until(s, way)
+    if within:
+        outward = x[:, way[within]] - x[:, way[0]]
+        outward = np.nanmean(outward, axis=0) / np.linalg.norm(np.nanmean(outward, axis=0))
+        found.rope[f"clamp_{at}"] = snapped(outward if at == "start" else -outward)
+        found.order = tuple(j for j in found.order if j not in way[:within])
+        found.notes.append(
+            f"{joined(names[j] for j in way[: within + 1])} stay in place: a clamp, and the rope is free from "
+            f"{names[way[within]]} on"
+        )
+        found.unknown.append(
+            f"where the clamp ends: the rope is taken to be free from {names[way[within]]} on. EI goes with the "
+            "third or fourth power of the free length: measure from where the clamp ends, and correct `markers`"
+        )
+        return
+    direction = _kept_direction(x, at, way)
+    if direction is not None:
+        found.rope[f"clamp_{at}"] = direction
+        found.notes.append(f"{names[way[0]]} stays in place and the rope keeps its direction there: a clamp")
+    else:
+        found.rope.setdefault("pinned", []).append(0 if at == "start" else -1)
+        found.notes.append(f"{names[way[0]]} stays in place and the rope turns there: it is pinned")
+
+
+def _gripped_end(s: Seen, found: Held, at: str, way: tuple[int, ...]) -> None:
+    """An end that two markers hold."""
+    names = s.recording.markers
+    pair = [names[j] for j in (way[:2] if at == "start" else way[1::-1])]
+    found.grips.append({"at": at, "markers": pair, "smoothing": SMOOTHING})
+    found.order = tuple(j for j in found.order if j != way[0])
+    found.notes.append(
+        f"{pair[0]} and {pair[1]} are gripped: they give the place and the direction, and the rope is free "
+        f"from {names[way[1]]} on"
+    )
+    found.unknown.append(f"whether the rope runs through {pair[0]} and {pair[1]}, as it is taken to do")
+
+
+def _led_end(s: Seen, found: Held, at: str, way: tuple[int, ...]) -> None:
+    """An end that moves with its one marker."""
+    name = s.recording.markers[way[0]]
+    grip: dict[str, Any] = {"at": at, "markers": [name], "smoothing": ALONE}
+    direction = _kept_direction(s.recording.positions, at, way)
+    if direction is not None:
+        grip["direction"] = direction
+        found.notes.append(f"{name} moves the rope, which keeps its direction there: the hand does not turn")
+    else:
+        found.alone.append(name)
+        found.notes.append(f"{name} moves the rope, which turns there")
+        found.unknown.append(
+            f"whether the hand turns the rope at {name}: one marker gives no direction, so the end turns "
+            "freely. If it is gripped firmly, record a second marker in the hand, and name both in `markers`"
+        )
+    found.grips.append(grip)
 
 
 def _clamped_until(s: Seen, way: tuple[int, ...]) -> int:
@@ -301,18 +317,21 @@ def _leaves(s: Seen, k: int) -> float:
     return float(t[gone[0]]) if len(gone) else float("inf")
 
 
-def _direction_stays(x: Array, order: tuple[int, ...]) -> tuple[bool, Array]:
-    """Whether the direction at an end varies much less than that of the first chord, and its mean."""
+def _kept_direction(x: Array, at: str, way: tuple[int, ...]) -> list[float] | None:
+    """The mean direction of travel at an end, where it varies much less than that of the first chord; else None."""
     some = x[np.linspace(0, len(x) - 1, min(len(x), 80)).astype(int)]
-    ways = np.array([tangent(frame, order) for frame in some if np.isfinite(frame[list(order[:3])]).all()])
+    ways = np.array([tangent(frame, way) for frame in some if np.isfinite(frame[list(way[:3])]).all()])
     if not len(ways):
-        return False, np.eye(3)[0]
-    chord = some[:, order[1]] - some[:, order[0]]
+        return None
+    chord = some[:, way[1]] - some[:, way[0]]
     chord = chord[np.isfinite(chord[:, 0])]
     chord = chord / np.linalg.norm(chord, axis=1, keepdims=True)
-    mean = ways.mean(axis=0)
     spread = [float(np.sqrt(v.var(axis=0).sum())) for v in (ways, chord)]
-    return spread[0] < STIFF * spread[1], mean / max(float(np.linalg.norm(mean)), 1e-12)
+    if not spread[0] < STIFF * spread[1]:
+        return None
+    mean = ways.mean(axis=0)
+    along = mean / max(float(np.linalg.norm(mean)), 1e-12)
+    return snapped(along if at == "start" else -along)
 
 
 def between_grips(s: Seen) -> bool:

@@ -17,6 +17,8 @@ from .take import Description, Measured, Take
 from .text import table
 
 Array = np.ndarray
+Piece = tuple[dict[str, Any], float]
+"""Keys of a recording that is a part of one, and when it begins."""
 FLAT, STRAIGHT = 0.02, 0.01  # of an arm: how far it may leave its plane, and how much its length may change
 HANGS = 0.5  # of an arm: how far its end is below the pivot on average, at least, where that tells what is up
 PIECES = {1: (3.0, 5.0), 2: (2.0, 2.0), 3: (1.0, 1.0)}  # s that are fitted and predicted at most, by arms: two diverge
@@ -50,55 +52,77 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         "masses: the motion shows only their ratios. One of them is set to 1 kg (or 1 kg m^2), and the others are "
         "relative to it"
     ]
+    if len(arms) > 1:
+        unknown.append("how the arms that hang share a mass at their hinges: it moves like a part of either one")
+    pieces, swing = _pieces(s, takes[0], len(arms)), _swing(x, r.times, joints)
     # The plane is y = 0: elsewhere rounding moves the arms out of it, and the fold of their triangles grows.
     pivot = (np.nanmean(x[:, joints[0]], axis=0) * (1.0, 0.0, 1.0)).tolist()
-    lines = takes[0].scene_lines
-    swing, pieces = _swing(x, r.times, joints), _pieces(s, takes[0], len(arms))
     step = float(np.median(np.diff(r.times)))
-    lines += table("[solver]", {"substeps": max(1, int(np.ceil(step / SUBSTEP - 1e-9)))})
+    lines = takes[0].scene_lines + table("[solver]", {"substeps": max(1, int(np.ceil(step / SUBSTEP - 1e-9)))})
     if len(arms) == 1:
-        single: dict[str, Any] = {
-            "name": "arm",
-            "length": radii[0],
-            "mass": 1.0,
-            "pivot": pivot,
-            "friction": 1e-3,
-            "drag": 1e-4,
-        }
-        lines += table("[[scene.pendulum]]", single, {"length": "of a point mass on a massless arm that swings alike"})
-        parameters: dict[str, dict[str, Any]] = {
+        lines += _point_mass(pivot, radii[0])
+    else:
+        lines += _arms(arms, pivot, radii, _moments(s, swing, pieces, radii))
+    lines += _markers(arms, names[1:], radii)
+    lines += _recordings(s, swing, pieces, arms, names[1:], radii)
+    for name, entries in _parameters(arms, radii).items():
+        lines += table(f"[parameters.{name}]", entries)
+    return Description(KINDS[len(arms)], notes, unknown, lines)
+
+
+def _point_mass(pivot: list[float], radius: float) -> list[str]:
+    """The table of a single arm."""
+    entries = {"name": "arm", "length": radius, "mass": 1.0, "pivot": pivot, "friction": 1e-3, "drag": 1e-4}
+    return table("[[scene.pendulum]]", entries, {"length": "of a point mass on a massless arm that swings alike"})
+
+
+def _moments(s: Seen, swing: Swing, pieces: Sequence[Piece], radii: Sequence[float]) -> Moments:
+    """Those of several arms, from the pieces that are fitted."""
+    shown_by = [_between(swing, piece["fit"]) for piece, _ in pieces if "held_out" not in piece]
+    return moments(shown_by, np.array(radii), float(np.abs(s.gravity).max()))
+
+
+def _markers(arms: Sequence[str], names: Sequence[str], radii: Sequence[float]) -> list[str]:
+    """The marker of each arm, and the quantity that is its offset across."""
+    lines: list[str] = []
+    for arm in arms:
+        lines += table(f"[scene.quantities.{arm}_zero]", {"scale": 1e-3}, {"scale": "m, of the marker's offset across"})
+    for arm, name, radius in zip(arms, names, radii, strict=True):
+        lines += table("[[marker]]", {"marker": name, "arm": arm, "radius": radius})
+    return lines
+
+
+def _recordings(
+    s: Seen, swing: Swing, pieces: Sequence[Piece], arms: Sequence[str], names: Sequence[str], radii: Sequence[float]
+) -> list[str]:
+    """Each piece, which begins with the angles and rates that the swing has there."""
+    lines: list[str] = []
+    common = {"sigma": max(s.noise, 1e-4), "axes": "xz"} | ({"radius": radii[0]} if len(arms) == 1 else {})
+    offsets = {name: ["", "", f"{arm}_zero"] for arm, name in zip(arms, names, strict=True)}
+    for entries, start in pieces:
+        frame = int(np.searchsorted(s.recording.times, start))
+        values = {f"{arm}_angle": float(swing.angles[k, frame]) for k, arm in enumerate(arms)}
+        values |= {f"{arm}_rate": float(swing.rates[k, frame]) for k, arm in enumerate(arms)}
+        lines += table("[[recording]]", entries | common | {"offsets": offsets, "values": values})
+    return lines
+
+
+def _parameters(arms: Sequence[str], radii: Sequence[float]) -> dict[str, dict[str, Any]]:
+    """What is fitted."""
+    found: dict[str, dict[str, Any]]
+    if len(arms) == 1:
+        found = {
             "arm_length": {"lower": 0.2 * radii[0], "upper": 5.0 * radii[0]},
             "arm_friction": {},
             "arm_drag": {},
         }
     else:
-        unknown.append("how the arms that hang share a mass at their hinges: it moves like a part of either one")
-        shown_by = [_between(swing, piece["fit"]) for piece, _ in pieces if "held_out" not in piece]
-        lines += _arms(arms, pivot, radii, moments(shown_by, np.array(radii), float(np.abs(s.gravity).max())))
-        parameters = {f"{arm}_{key}": dict[str, Any]() for arm in arms for key in ("first_moment", "inertia")}
-        del parameters["upper_inertia"]  # the scale of all masses
-        parameters |= {f"{arm}_{loss}": {} for loss in ("friction", "hinge_viscosity") for arm in arms}
-        parameters["lower_drag"] = {}
-    for arm in arms:
-        lines += table(f"[scene.quantities.{arm}_zero]", {"scale": 1e-3}, {"scale": "m, of the marker's offset across"})
-        parameters[f"{arm}_zero"] = {}
-    for arm, name, radius in zip(arms, names[1:], radii, strict=True):
-        lines += table("[[marker]]", {"marker": name, "arm": arm, "radius": radius})
-    sigma = max(s.noise, 1e-4)
-    for entries, start in pieces:
-        frame = int(np.searchsorted(r.times, start))
-        values = {f"{arm}_angle": float(swing.angles[k, frame]) for k, arm in enumerate(arms)}
-        values |= {f"{arm}_rate": float(swing.rates[k, frame]) for k, arm in enumerate(arms)}
-        offsets = {name: ["", "", f"{arm}_zero"] for arm, name in zip(arms, names[1:], strict=True)}
-        shown = {"radius": radii[0]} if len(arms) == 1 else {}
-        lines += table(
-            "[[recording]]", entries | {"sigma": sigma, "axes": "xz"} | shown | {"offsets": offsets, "values": values}
-        )
-    for arm in arms:
-        parameters |= {f"{arm}_angle": {"private": True}, f"{arm}_rate": {"private": True}}
-    for name, entries in parameters.items():
-        lines += table(f"[parameters.{name}]", entries)
-    return Description(KINDS[len(arms)], notes, unknown, lines)
+        found = {f"{arm}_{key}": {} for arm in arms for key in ("first_moment", "inertia")}
+        del found["upper_inertia"]  # the scale of all masses
+        found |= {f"{arm}_{loss}": {} for loss in ("friction", "hinge_viscosity") for arm in arms}
+        found["lower_drag"] = {}
+    found |= {f"{arm}_zero": {} for arm in arms}
+    return found | {f"{arm}_{key}": {"private": True} for arm in arms for key in ("angle", "rate")}
 
 
 def _joints(s: Seen) -> list[int] | None:
@@ -191,7 +215,7 @@ def _between(swing: Swing, part: list[float]) -> Swing:
     return Swing(swing.times[inside], swing.angles[:, inside], swing.rates[:, inside], swing.seen[inside])
 
 
-def _pieces(s: Seen, take: Take, arms: int) -> list[tuple[dict[str, Any], float]]:
+def _pieces(s: Seen, take: Take, arms: int) -> list[Piece]:
     """Recordings cut from one. Of one arm the first part is fitted, in pieces, and the rest is predicted from its first
     moments. Of more arms, fitted and predicted pieces take turns: friction is seen only where the swing has become
     small, and wide swings magnify what the model lacks."""
@@ -209,7 +233,7 @@ def _pieces(s: Seen, take: Take, arms: int) -> list[tuple[dict[str, Any], float]
         rest = start + FITTED * length
         room = (stop - rest) / PREDICTED
         predicted = [rest + k * room for k in range(PREDICTED)]
-    found: list[tuple[dict[str, Any], float]] = []
+    found: list[Piece] = []
     for k, a in enumerate(fitted):
         found.append(({**take.reading, "name": f"fitted_{k}", "fit": [a, a + length]}, a))
     for k, a in enumerate(round(a, 4) for a in predicted):

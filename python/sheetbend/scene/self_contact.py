@@ -26,7 +26,7 @@ class SelfTouchingScene(HeldScene):
         pairs: int | None = None,
         name: str = "self",
     ) -> None:
-        """Let ropes, cloths and bodies touch themselves and each other; see docs/contact.md.
+        """Let ropes, cloths and bodies touch themselves and each other; see docs/self_contact.md.
 
         Links of ropes, edges and triangles of cloths and capsules of bodies push each other apart and never pass
         through. Needs method "implicit". Once per scene, with all pieces.
