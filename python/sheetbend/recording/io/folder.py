@@ -41,6 +41,8 @@ def read_recordings(
     root = Path(folder)
     if not root.is_dir():
         raise RecordingError("folder", "is no folder", str(folder), "give the folder that holds the files")
+    if not isinstance(pattern, str) or not pattern or Path(pattern).is_absolute():
+        raise RecordingError("pattern", "is no pattern of names", pattern, "give such as '*.csv'")
     known = [suffix for suffix in FORMATS if suffix != NOTES or pattern.lower().endswith(NOTES)]
     files = sorted((p for p in root.glob(pattern) if p.is_file() and p.suffix.lower() in known), key=by_number)
     if not files:
