@@ -65,7 +65,7 @@ def test_predictions_that_do_not_fit_are_refused() -> None:
         (hole, 1, r"is not finite in frame 2, marker 'm3' of swing"),
         (np.where(np.isnan(hole), np.inf, hole), 1, "is not finite in frame 2"),
         (recording.positions, 3, r"given: leaves nothing to score \(got 3\).*3 frames of swing"),
-        (recording.positions, -1, "given: must not be negative"),
+        (recording.positions, -1, "given: must be a whole number, at least 0"),
     ):
         with pytest.raises(sb.RecordingError, match=words):
             sb.coordinate_error(recording, predicted, given)

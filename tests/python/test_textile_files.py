@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -269,3 +270,12 @@ def test_a_shipped_knit_comes_back(pull, tmp_path):
         assert curve.load == approx(force[k][seen[k]] / 0.1, abs=1e-6)
         cut = curve.from_pretension(10.0)  # 1 N
         assert cut.load[0] == approx(10.0) and cut.cycles()[0].lost is None
+
+
+def test_a_cell_of_many_digits_takes_linear_time(tmp_path):
+    """A letter after 30,000 digits: no number, which matching must not try to split in every place."""
+    path = tmp_path / "strip.csv"
+    path.write_text("Weg [mm];Kraft [N]\n0,0;0,0\n1,0;1,0\n2,0;2,0\n" + f"{'9' * 30_000}x;1,0\n")
+    began = time.process_time()
+    (curve,) = textile.read_curves(path, length=LENGTH, width=WIDTH)
+    assert len(curve.load) == 3 and time.process_time() - began < 2.0

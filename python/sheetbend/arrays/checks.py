@@ -2,20 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError, SceneError
 
+MOST = float(np.finfo(float).max)
+MOST_WHOLE = 2**31 - 1
+"""The largest whole number that the core takes."""
+
+
+def numbers(field: str, values: ArrayLike, error: type[InputError], copy: bool = False) -> np.ndarray:
+    """values as float64, where they are none yet or a `copy` is wanted in a new array; NaN and infinity are numbers.
+
+    Raises:
+        InputError: of the class `error`: texts, complex numbers, ragged rows, a tensor that has a gradient, ...
+    """
+    try:
+        array = np.array(values) if copy else np.asarray(values)
+        if array.dtype.kind not in "iufO":
+            raise TypeError(f"{array.dtype} is no type of real numbers")
+        return array.astype(float, copy=False)
+    except (TypeError, ValueError, OverflowError, RuntimeError) as problem:
+        raise error(field, "is not an array of numbers", type(values).__name__, "give numbers") from problem
+
 
 def finite(field: str, values: ArrayLike, shape: tuple[int, ...] | None, error: type[InputError]) -> np.ndarray:
     """values as float64 of the given shape, without NaN or infinity."""
-    try:
-        array = np.array(values, dtype=float)
-    except (TypeError, ValueError) as problem:
-        raise error(field, "is not an array of numbers", type(values).__name__, "give numbers") from problem
+    array = numbers(field, values, error, copy=True)
     if shape is not None and array.shape != shape:
         raise error(field, "has the wrong shape", array.shape, f"give {shape}")
     if not np.isfinite(array).all():
@@ -37,7 +53,47 @@ def check_increasing(field: str, times: np.ndarray) -> None:
 
 def is_number(value: object) -> bool:
     """Whether a value is a finite real number."""
-    return isinstance(value, int | float | np.integer | np.floating) and bool(np.isfinite(value))
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        return False
+    return bool(-MOST <= value <= MOST)
+
+
+def is_bound(value: object) -> bool:
+    """Whether a value is a real number or infinite, an open end."""
+    return is_number(value) or (isinstance(value, float) and value in (-np.inf, np.inf))
+
+
+def check_label(field: str, name: object) -> None:
+    """Refuse what cannot be the name of a part of a scene.
+
+    Raises:
+        SceneError: it is no text, or an empty one.
+    """
+    if not isinstance(name, str) or not name.strip():
+        raise SceneError(field, "must be a text", name, "give a name, such as 'rope'")
+
+
+def check_count(field: str, value: object, least: int, most: int, error: type[InputError] = SceneError) -> None:
+    """Refuse what is no whole number in a range.
+
+    Raises:
+        InputError: of the class `error`.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise error(field, f"must be a whole number, at least {least}", value, f"give one from {least} to {most}")
+    if value > most:
+        raise error(field, f"must be at most {most}", value, "give fewer")
+
+
+def check_kind(field: str, value: object, kind: type, fix: str, error: type[InputError] = InputError) -> None:
+    """Refuse an argument of another class.
+
+    Raises:
+        InputError: of the class `error`.
+    """
+    if not isinstance(value, kind):
+        article = "an" if kind.__name__[0] in "AEIOU" else "a"
+        raise error(field, f"must be {article} {kind.__name__}", value, fix)
 
 
 def check_positive(name: str, required: Mapping[str, float], optional: Mapping[str, float | None]) -> None:
@@ -56,6 +112,14 @@ def points(field: str, values: ArrayLike) -> np.ndarray:
     return array
 
 
+def vectors(field: str, values: ArrayLike, error: type[InputError] = SceneError) -> np.ndarray:
+    """(..., 3) finite numbers, such as points or directions."""
+    array = finite(field, values, None, error)
+    if array.ndim == 0 or array.shape[-1] != 3:
+        raise error(field, "has the wrong shape", array.shape, "give three numbers for each, (..., 3)")
+    return array
+
+
 def per_item(field: str, values: ArrayLike, count: int) -> np.ndarray:
     """One number for all or (count,), as a new array (count,)."""
     array = finite(field, values, None, SceneError)
@@ -70,6 +134,12 @@ def indices(field: str, values: ArrayLike, count: int) -> list[int]:
     return found
 
 
+def some_indices(field: str, values: ArrayLike, count: int) -> list[int]:
+    """`indices`, of which there may be none."""
+    none = isinstance(values, Sequence | np.ndarray | set) and len(values) == 0 and not isinstance(values, str)
+    return [] if none else indices(field, values, count)
+
+
 def index_array(field: str, values: ArrayLike, count: int) -> np.ndarray:
     """`indices` as one array."""
     return node_array(field, values, count, hidden=count) % count
@@ -77,13 +147,22 @@ def index_array(field: str, values: ArrayLike, count: int) -> np.ndarray:
 
 def node_array(field: str, values: ArrayLike, particles: int, hidden: int = 0) -> np.ndarray:
     """Numbers of a scene's nodes as one array: particles from 0 on, and hidden nodes from -1 down where some may be."""
-    array = np.atleast_1d(np.array(values))
-    if array.size == 0 or not np.issubdtype(array.dtype, np.integer):
+    array = whole(values)
+    if array.size == 0:
         raise SceneError(field, "must be particle indices", values, "give whole numbers")
     bad = array[(array < -hidden) | (array >= particles)]
     if bad.size:
         raise SceneError(field, "name particles that do not exist", bad[:5].tolist(), f"use 0 to {particles - 1}")
     return array.ravel().astype(np.int64)
+
+
+def whole(values: ArrayLike) -> np.ndarray:
+    """values (n,) or more as a new array of whole numbers; an empty one where they are anything else."""
+    try:
+        array = np.atleast_1d(np.array(values))
+    except (TypeError, ValueError, RuntimeError):  # rows of different lengths, a tensor that has a gradient
+        array = np.zeros(0)
+    return array if np.issubdtype(array.dtype, np.integer) else np.zeros(0, dtype=np.int64)
 
 
 def triangle_array(field: str, values: ArrayLike, count: int) -> np.ndarray:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays.checks import MOST_WHOLE, check_count
 from ..arrays.timeseries import Array
 from ..errors import InputError
 from ..minimum.linear_step import gauss_newton
@@ -43,6 +44,7 @@ def check_bootstrap(draws: int, problem: FitProblem) -> None:
     Raises:
         InputError: too few draws, or experiments whose residuals are not independent of unknowns of their own.
     """
+    check_count("bootstrap", draws, 0, MOST_WHOLE, InputError)
     if draws and draws < FEWEST_DRAWS:
         fix = f"give 0 for none, or at least {FEWEST_DRAWS}; 200 tell an interval to about 10 %"
         raise InputError("bootstrap", "must be large enough to show an interval", draws, fix)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..arrays.checks import is_number
+from ..arrays.checks import check_kind, is_number
 from ..arrays.timeseries import Array
 from ..errors import InputError
 from ..minimum.problem import FitProblem
@@ -46,6 +46,7 @@ def check_given(given: Mapping[str, float], problem: FitProblem) -> None:
     Raises:
         InputError: names the key.
     """
+    check_kind("given", given, Mapping, "give standard deviations by name")
     u = problem.parameters.initial()
     known = [
         *dict.fromkeys(name for i in range(len(problem.experiments)) for name, *_ in told_quantities(problem, u, i)),

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from ..arrays.checks import is_number
+from ..arrays.checks import is_bound, is_number
 from ..errors import InputError
 from ..recording.windows import Window
 from ..scene.scene import Scene
@@ -22,16 +21,16 @@ def check_errors(
     """Refuse what errors of markers cannot be measured by, see the fields of `Experiment`."""
     if not (is_number(sigma) and sigma > 0):
         raise InputError(f"{name}.sigma", "must be positive", sigma, "give the expected error of a marker in m")
-    if not axes or set(axes) - set("xyz") or len(set(axes)) != len(axes):
+    if not isinstance(axes, str) or not axes or set(axes) - set("xyz") or len(set(axes)) != len(axes):
         raise InputError(f"{name}.axes", "must be some of x, y, z", axes, "give such as 'xz'")
-    if radius is not None and not (math.isfinite(radius) and radius > 0):
+    if radius is not None and not (is_number(radius) and radius > 0):
         raise InputError(
             f"{name}.radius", "must be positive", radius, "give the markers' distance from their pivot in m"
         )
     if loss not in LOSSES[: len(LOSSES) if is_cloud else -1]:
         known = "'squares', 'soft_l1' or 'huber', or for a cloud 'cauchy'"
         raise InputError(f"{name}.loss", "is unknown", loss, f"use {known}")
-    if not (math.isfinite(loss_scale) and loss_scale > 0):
+    if not (is_number(loss_scale) and loss_scale > 0):
         raise InputError(f"{name}.loss_scale", "must be positive", loss_scale, "give it in units of sigma")
 
 
@@ -52,10 +51,10 @@ def check_parts(
         raise InputError(f"{name}.start", f"cannot be estimated for {what}", start, "leave it out")
     if predict not in (None, "window", "mean"):
         raise InputError(f"{name}.predict", "is unknown", predict, "use 'window' or 'mean', or leave it out")
-    if start_time is not None and not math.isfinite(start_time):
+    if start_time is not None and not is_number(start_time):
         raise InputError(f"{name}.start_time", "must be finite", start_time, "give a time of the recording in s")
     for part, window in (("fit", fit), ("held_out", held_out)):
-        if window is not None and np.shape(window) != (2,):
+        if window is not None and not _is_window(window):
             raise InputError(f"{name}.{part}", "must be (start, stop)", window, "give two times of the recording in s")
     if fit is not None and held_out is not None and max(fit[0], held_out[0]) < min(fit[1], held_out[1]):
         fix = "hold out frames that the fit does not see"
@@ -65,11 +64,17 @@ def check_parts(
         raise InputError(f"{name}.held_out", "makes no sense for an equilibrium", held_out, fix)
 
 
+def _is_window(window: object) -> bool:
+    """Whether it is a pair of times, of which infinite ones are open ends."""
+    pair = isinstance(window, Sequence | np.ndarray) and not isinstance(window, str) and len(window) == 2
+    return pair and all(is_bound(t) for t in window)  # type: ignore[attr-defined]
+
+
 def check_driven_sigma(name: str, given: float | str | None, scene: Scene) -> None:
     """Refuse a noise of driven markers that is no noise, or has no markers."""
     if given is None:
         return
-    if given != "estimate" and not (is_number(given) and given > 0):  # type: ignore[operator]
+    if not (isinstance(given, str) and given == "estimate") and not (is_number(given) and given > 0):  # type: ignore[operator]
         fix = "give the noise of the driven markers in m, or 'estimate'"
         raise InputError(f"{name}.driven_sigma", "must be positive", given, fix)
     if not scene.boundary.following:
@@ -80,6 +85,8 @@ def check_driven_sigma(name: str, given: float | str | None, scene: Scene) -> No
 def check_forces(name: str, sensors: Sequence[ForceSensor], scene: Scene, static: bool, unknown: str | None) -> None:
     """Refuse force sensors that share a name, or that a scene or an experiment cannot have, such as beside a field for
     which numbers are estimated along with the parameters."""
+    if not isinstance(sensors, Sequence) or not all(isinstance(s, ForceSensor) for s in sensors):
+        raise InputError(f"{name}.forces", "must be a list of sensors", sensors, "give [sb.ForceSensor(...)]")
     names = [sensor.name for sensor in sensors]
     if len(set(names)) != len(names):
         raise InputError(f"{name}.forces", "share a name", names, "give each sensor a name of its own")

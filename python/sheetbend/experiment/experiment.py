@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays.checks import check_kind
 from ..errors import InputError, RecordingError
 from ..motion.solver import Solver
 from ..objects.markers import Place, places_for
@@ -95,6 +96,8 @@ class Experiment:
     def __post_init__(self) -> None:
         if not isinstance(self.recording, Recording):
             raise InputError("recording", "is no Recording", self.recording, "read the file: sb.Recording.load(path)")
+        check_kind("scene", self.scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
+        object.__setattr__(self, "solver", Solver.given(self.solver))
         if not self.name:
             object.__setattr__(self, "name", self.recording.name)
         if self.is_cloud:

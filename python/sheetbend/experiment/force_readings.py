@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _core
-from ..arrays.checks import finite
+from ..arrays.checks import check_kind, finite
 from ..errors import InputError
 from ..motion.core_terms import divergence
 from ..motion.solver import Solver
@@ -54,7 +54,7 @@ def simulate_forces(
         DivergenceError: as `simulate`.
     """
     made = read_at(times, at, quaternions, **sensor)
-    t, read = sensor_readings(made, scene, solver or Solver(), values, start)
+    t, read = sensor_readings(made, scene, Solver.given(solver), values, start)
     return ForceRecording(t, read[:, :3], read[:, 3:], made.recording.quaternions, made.name)
 
 
@@ -98,6 +98,7 @@ def readings_problem(
     Raises:
         InputError: unknown quantities, or values that make no sense.
     """
+    check_kind("scene", scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
     experiment = Experiment(
         scene=scene,
         recording=Recording(np.zeros((2, 1, 3)), np.array(span)),

@@ -94,7 +94,7 @@ class ForceSensor:
             if not (is_number(value) and value > 0) and not (value is None and key == "torque_sigma"):  # type: ignore[operator]
                 raise InputError(f"{self.name}.{key}", "must be positive", value, "give the sensor's expected error")
         for key, axes in (("axes", self.axes), ("torque_axes", self.torque_axes)):
-            if set(axes) - set(AXES) or len(set(axes)) != len(axes):
+            if not isinstance(axes, str) or set(axes) - set(AXES) or len(set(axes)) != len(axes):
                 raise InputError(f"{self.name}.{key}", "must be some of x, y, z", axes, "give such as 'z'")
         if self.torque_sigma is not None and self.recording.torques is None:
             fix = "leave torque_sigma out"
@@ -170,7 +170,7 @@ class ForceSensor:
 
     def particles(self, scene: Scene, path: str = "force") -> list[int]:
         """What the support holds, directors included; the place of the first one is where torques are taken."""
-        if len(self.at) == 2 and isinstance(self.at[0], str):
+        if isinstance(self.at, Sequence) and len(self.at) == 2 and isinstance(self.at[0], str):
             return end_of_rope(scene, str(self.at[0]), str(self.at[1]), path)
         found: list[int] = scene.node_array(f"{path}.at", self.at).tolist()
         return list(dict.fromkeys(found))

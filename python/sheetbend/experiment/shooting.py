@@ -46,6 +46,16 @@ class Shooting:
     is_given: bool = False
     steps: int = 30
 
+    def __post_init__(self) -> None:
+        length = 1.0 if isinstance(self.window, str) and self.window == AUTO else self.window
+        if not (is_number(length) and length > 0):  # type: ignore[operator]
+            fix = "give the length of a window in s, or 'auto'"
+            raise InputError("shooting.window", "must be a length", self.window, fix)
+        for field in ("loss", "behind", "pace"):
+            value = getattr(self, field)
+            if value is not None and not (is_number(value) and value >= 0):
+                raise InputError(f"shooting.{field}", "must not be negative", value, "give a number, or leave it out")
+
     @staticmethod
     def given(name: str, wanted: object, beside: Mapping[str, bool]) -> Shooting | None:
         """What an experiment was given, checked.

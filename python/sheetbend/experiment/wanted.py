@@ -35,12 +35,14 @@ def as_parameters(
     """
     if isinstance(wanted, str):
         raise InputError("parameters", "must be a list of names", wanted, f"write ['{wanted}']")
+    if not isinstance(wanted, Iterable):
+        raise InputError("parameters", "must be a list of names", wanted, "write ['rope_EI']")
     known = quantities_of(experiments)
     each = ((p.name, p) if isinstance(p, Parameter) else (p, None) for p in wanted)
     items = wanted.items() if isinstance(wanted, Mapping) else each
     complete = []
     for name, given in items:
-        if name not in known:
+        if not isinstance(name, str) or name not in known:
             raise InputError("parameters", "name no quantity of the scenes", name, choices(name, known))
         if isinstance(given, Parameter):
             complete.append(given)

@@ -10,6 +10,7 @@ from pathlib import Path
 from ..errors import InputError
 
 UNITS = {"B": 1, "kB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12, "KiB": 2**10, "MiB": 2**20, "GiB": 2**30}
+MOST = 2**62  # bytes
 _BY_LOWER = {unit.lower(): size for unit, size in UNITS.items()}
 
 
@@ -25,7 +26,7 @@ def in_bytes(field: str, amount: object) -> int:
         if parts is not None and parts[2].lower() in _BY_LOWER:
             size = float(parts[1]) * _BY_LOWER[parts[2].lower()]
     elif isinstance(amount, int | float) and not isinstance(amount, bool):
-        size = float(amount)
+        size = float(amount) if amount < MOST else math.inf
     if not (math.isfinite(size) and size >= 1.0):
         fix = f'give bytes, or a text such as "2 GB"; units are {", ".join(UNITS)}'
         raise InputError(field, "is no amount of memory", amount, fix)

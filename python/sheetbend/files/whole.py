@@ -31,7 +31,7 @@ def written(path: str | Path) -> Iterator[Path]:
     """
     path = Path(path)
     direct = path.exists() and not path.is_file() and not path.is_dir()
-    beside = path if direct else path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    beside = path if direct else path.parent / f".{path.stem}.{os.getpid()}{path.suffix}"
     try:
         yield beside
         if not direct:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from ..errors import InputError
@@ -33,10 +33,23 @@ def experiments_of(
     if recording is not None or fields:
         fix = "put everything into the experiments"
         raise InputError("recording", "goes with a single scene", sorted(fields) or "recording", fix)
-    experiments = [scene] if isinstance(scene, Experiment) else list(scene)
+    experiments = listed([scene] if isinstance(scene, Experiment) else scene)
     if not experiments:
         raise InputError("experiments", "are empty", 0, "give at least one")
     return within(experiments)
+
+
+def listed(experiments: Iterable[Experiment]) -> list[Experiment]:
+    """The experiments as a list.
+
+    Raises:
+        InputError: they are no list, or hold something else.
+    """
+    found = list(experiments) if isinstance(experiments, Iterable) else []
+    if not isinstance(experiments, Iterable) or not all(isinstance(e, Experiment) for e in found):
+        fix = "give a scene with its recording, an sb.Experiment, or a list of them"
+        raise InputError("experiments", "hold what is no Experiment", experiments, fix)
+    return found
 
 
 def within(experiments: list[Experiment]) -> list[Experiment]:

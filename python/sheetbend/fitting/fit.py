@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays.checks import MOST_WHOLE, check_count
 from ..doubts.bootstrap import check_bootstrap
 from ..doubts.given import check_given
 from ..doubts.leave_one_out import companions, each_left_out
@@ -188,11 +189,11 @@ def fit(
         SheetbendError: the simulation with the initial values diverges or has no equilibrium.
     """
     experiments = experiments_of(scene, recording, experiment)
-    wanted, fields = with_fields(as_parameters(parameters, experiments), experiments, smooth or {})
-    if threads < 1:
-        raise InputError("threads", "must be positive", threads, "give at least 1")
+    smooth = {} if smooth is None else smooth
+    wanted, fields = with_fields(as_parameters(parameters, experiments), experiments, smooth)
+    check_count("threads", threads, 1, MOST_WHOLE, InputError)
     require("scipy.special", "fit")  # of intervals, behind all the work
-    asked = Asked(wanted_refinement(refine), systematic, given or {}, profiles, bootstrap, threads)
+    asked = Asked(wanted_refinement(refine), systematic, {} if given is None else given, profiles, bootstrap, threads)
     search = Search(optimizer, starts, windows, max_iterations, tolerance, progress)
     clock = Clock.started()
     fitted = _fitted(experiments)

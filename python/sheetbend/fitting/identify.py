@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays.checks import MOST_WHOLE, check_count, check_kind, is_number
 from ..arrays.timeseries import Array
 from ..doubts.floors import solver_floors
 from ..doubts.roughness import rough_parameters
@@ -55,9 +56,9 @@ class _Noise:
     correlation: float
 
     def __post_init__(self) -> None:
-        if self.sigma is not None and not (math.isfinite(self.sigma) and self.sigma > 0):
+        if self.sigma is not None and not (is_number(self.sigma) and self.sigma > 0):
             raise InputError("noise", "must be positive", self.sigma, "give the markers' noise in m")
-        if not -1.0 < self.correlation < 1.0:
+        if not is_number(self.correlation) or not -1.0 < self.correlation < 1.0:
             fix = "give a correlation of neighboring frames between -1 and 1"
             raise InputError("autocorrelation", "is none", self.correlation, fix)
 
@@ -124,6 +125,8 @@ def identify(
         MissingExtraError: SciPy is not installed.
     """
     require("scipy.special", "fit")
+    check_kind("instead", {} if instead is None else instead, Mapping, "give lists of experiments by words")
+    check_count("threads", threads, 1, MOST_WHOLE, InputError)
     experiments = _planned(scene, recording, experiment)
     wanted, _ = with_fields(as_parameters(parameters, experiments), experiments, smooth or {})
     expected = _Noise(noise, autocorrelation)

@@ -9,6 +9,7 @@ from concurrent.futures import Executor
 
 import numpy as np
 
+from ..arrays.checks import MOST_WHOLE, check_count
 from ..arrays.timeseries import Array
 from ..errors import InputError, SheetbendError
 from ..experiment.experiment import Experiment
@@ -25,7 +26,7 @@ from ..result.estimate import Estimate
 from ..statistics.gauge import RANK_TOLERANCE, NullSpace, null_space
 from ..statistics.intervals import at_far_limit, clipped, closed_estimate, linear_ends, open_estimate
 from ..statistics.judge import LEVEL
-from .experiments import within
+from .experiments import listed, within
 
 FEWEST = 20  # recordings
 RESTS = 1e-6  # of a parameter's size: so near a bound it rests there
@@ -68,7 +69,10 @@ def fit_many(
         InputError: inputs are inconsistent; the message names them. Raised before work starts.
         SheetbendError: a motion diverges with the initial values.
     """
-    every = within(list(experiments))
+    check_count("max_iterations", max_iterations, 1, MOST_WHOLE, InputError)
+    if progress is not None and not callable(progress):
+        raise InputError("progress", "is no function", progress, "give one, or leave it out")
+    every = within(listed(experiments))
     if len(every) < FEWEST:
         raise InputError("experiments", "are few", len(every), f"give at least {FEWEST}, or use sheetbend.fit")
     if ahead := [e.name for e in every if e.predict is not None]:

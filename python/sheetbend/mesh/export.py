@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays.checks import finite
+from ..arrays.checks import check_kind, finite
 from ..errors import MeshError
 from ..files.whole import write_text, written
 from .triangle_mesh import TriangleMesh
@@ -156,6 +156,7 @@ def _frame_files(folder: Path, count: int, suffix: str) -> list[Path]:
 
 
 def _positions(mesh: TriangleMesh, positions: ArrayLike | None, frames: tuple[int, ...]) -> Array:
+    check_kind("mesh", mesh, TriangleMesh, "give such as sb.mesh.grid(width, height, nx, ny)", MeshError)
     return finite(
         "positions", mesh.vertices if positions is None else positions, (*frames, *mesh.vertices.shape), MeshError
     )

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays.checks import check_count, is_number
 from ..errors import MeshError
 from .topology import Indices
 from .triangle_mesh import TriangleMesh
+from .validate import MOST_CELLS
 
 PATTERNS = ("alternating", "crossed", "one_way")
 
@@ -29,8 +31,8 @@ def grid(width: float, height: float, nx: int, ny: int, pattern: str = "alternat
         MeshError: a size or a number that is not positive, or an unknown pattern.
     """
     _check_size(width, height)
-    _check_count("nx", nx)
-    _check_count("ny", ny)
+    check_count("nx", nx, 1, MOST_CELLS, MeshError)
+    check_count("ny", ny, 1, MOST_CELLS // nx, MeshError)
     if pattern not in PATTERNS:
         raise MeshError("pattern", "is unknown", pattern, f"use one of {', '.join(PATTERNS)}")
     x, y = np.meshgrid(np.linspace(0.0, width, nx + 1), np.linspace(0.0, height, ny + 1))
@@ -66,9 +68,10 @@ def equilateral(width: float, height: float, n: int) -> TriangleMesh:
         MeshError: a size or a number that is not positive.
     """
     _check_size(width, height)
-    _check_count("n", n)
+    check_count("n", n, 1, MOST_CELLS, MeshError)
     side = width / n
     rows = max(1, round(height / (side * np.sqrt(3.0) / 2)))
+    check_count("height over the side of a triangle", rows, 1, MOST_CELLS // n, MeshError)
     even = np.linspace(0.0, width, n + 1)
     odd = np.concatenate([[0.0], even[:-1] + side / 2, [width]])
     levels = [odd if j % 2 else even for j in range(rows + 1)]
@@ -104,10 +107,5 @@ def _flat_mesh(
 
 def _check_size(width: float, height: float) -> None:
     for name, value in (("width", width), ("height", height)):
-        if not (np.isfinite(value) and value > 0):
+        if not (is_number(value) and value > 0):
             raise MeshError(name, "must be a positive length", value, "give meters")
-
-
-def _check_count(name: str, value: int) -> None:
-    if value < 1 or value != int(value):
-        raise MeshError(name, "must be a whole number, at least 1", value, "say how many cells")

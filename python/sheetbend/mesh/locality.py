@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..arrays.checks import check_kind
+from ..errors import MeshError
 from .topology import Indices
 from .triangle_mesh import TriangleMesh
 
@@ -14,6 +16,7 @@ def renumbered(mesh: TriangleMesh) -> TriangleMesh:
     Results do not depend on it beyond rounding and the order of Gauss-Seidel. A large mesh whose numbers jump about
     takes up to 1.5 times longer by sweeps, because neighbors do not share cache lines (docs/benchmarks.md).
     """
+    check_kind("mesh", mesh, TriangleMesh, "give such as sb.mesh.grid(width, height, nx, ny)", MeshError)
     longest = np.argmax(np.ptp(mesh.vertices, axis=0))
     order = np.argsort(mesh.vertices[:, longest], kind="stable")
     place: Indices = np.empty(len(order), dtype=np.int64)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays.checks import check_count, is_number
 from ..errors import MeshError
 from . import topology
 from .topology import Indices
@@ -12,6 +13,8 @@ from .triangle_mesh import TriangleMesh
 from .unfold import unfold
 
 Array = NDArray[np.float64]
+
+MOST_RINGS, MOST_SPLITS = 1000, 9  # 6 and 5 million triangles
 
 
 def disk(radius: float, rings: int, support: float | None = None) -> TriangleMesh:
@@ -31,14 +34,14 @@ def disk(radius: float, rings: int, support: float | None = None) -> TriangleMes
     Raises:
         MeshError: a size that is not positive, or a support that has no ring of its own.
     """
-    _check("radius", radius > 0 and np.isfinite(radius), radius, "a positive length", "meters")
-    _check("rings", rings >= 1 and rings == int(rings), rings, "a whole number, at least 1", "the number of rings")
+    _check("radius", is_number(radius) and radius > 0, radius, "a positive length", "meters")
+    check_count("rings", rings, 1, MOST_RINGS, MeshError)
     ring, angle, triangles = _rings(rings)
-    at = radius * ring / rings
+    at = float(radius) * ring / rings
     held = ring == rings
     sets = {"center": np.array([0]), "rim": np.flatnonzero(held)}
     if support is not None:
-        inner = round(rings * support / radius)
+        inner = round(rings * support / radius) if is_number(support) else 0
         _check("support", 0 < inner < rings, support, "near a ring inside of the rim", "another radius or more rings")
         at[ring == inner] = support
         held |= ring == inner
@@ -87,9 +90,8 @@ def icosphere(radius: float, subdivisions: int) -> TriangleMesh:
     Raises:
         MeshError: a radius that is not positive, or a number that is not whole.
     """
-    _check("radius", radius > 0 and np.isfinite(radius), radius, "a positive length", "meters")
-    whole = subdivisions >= 0 and subdivisions == int(subdivisions)
-    _check("subdivisions", whole, subdivisions, "a whole number, at least 0", "how often to split")
+    _check("radius", is_number(radius) and radius > 0, radius, "a positive length", "meters")
+    check_count("subdivisions", subdivisions, 0, MOST_SPLITS, MeshError)
     vertices, triangles = _icosahedron()
     for _ in range(subdivisions):
         sides = triangles[:, [[0, 1], [1, 2], [2, 0]]]

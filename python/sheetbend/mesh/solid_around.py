@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays.checks import check_kind, is_number
 from ..errors import MeshError
 from .solid_mesh import SolidMesh, bricks
 from .triangle_mesh import TriangleMesh
@@ -29,10 +30,11 @@ def bricks_around(surface: TriangleMesh, size: float) -> SolidMesh:
     Raises:
         MeshError: a surface with borders or inside out, or a size that is not positive.
     """
+    check_kind("surface", surface, TriangleMesh, "give a closed mesh, such as sb.read_mesh(path)", MeshError)
     if len(surface.borders):
         problem = f"is not closed: {len(surface.borders)} edges have one triangle"
         raise MeshError("surface", problem, surface.borders[0].tolist(), "close its holes")
-    if not size > 0:
+    if not (is_number(size) and size > 0):
         raise MeshError("size", "must be positive", size, "give the side of a brick in m")
     low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
     cells = [max(1, round(float(n))) for n in (high - low) / size]

@@ -10,12 +10,13 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays.checks import finite
+from ..arrays.checks import check_count, check_kind, finite, whole
 from ..errors import MeshError
 from . import validate
 from .places import nearest
 from .solid_element import CORNERS, FACES, own_coordinates, quadrature, surface_faces
 from .triangle_mesh import TriangleMesh
+from .validate import MOST_CELLS
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -71,6 +72,7 @@ class SolidMesh:
     def __post_init__(self) -> None:
         vertices = validate.rows("vertices", self.vertices, 3)
         elements = _checked_elements(self.elements, len(vertices))
+        check_kind("sets", self.sets, Mapping, "give lists of vertices by name", MeshError)
         sets = {name: validate.checked_set(name, ids, len(vertices)) for name, ids in self.sets.items()}
         fill = np.ones(len(elements)) if self.fill is None else finite("fill", self.fill, (len(elements),), MeshError)
         if not ((fill > 0) & (fill <= 1)).all():
@@ -181,8 +183,10 @@ def bricks(size: ArrayLike, cells: Sequence[int], at: ArrayLike = (0.0, 0.0, 0.0
     box, origin = finite("size", size, (3,), MeshError), finite("at", at, (3,), MeshError)
     if not (box > 0).all():
         raise MeshError("size", "must be positive", box.tolist(), "give three lengths in m")
-    if len(cells) != 3 or not all(isinstance(n, int | np.integer) and n > 0 for n in cells):
+    numbers = whole(cells)
+    if numbers.shape != (3,) or not (numbers > 0).all():
         raise MeshError("cells", "must be three positive whole numbers", cells, "give the bricks along x, y and z")
+    check_count("bricks in all", int(np.prod(numbers, dtype=float)), 1, MOST_CELLS, MeshError)
     lines = [o + s * np.linspace(0.0, 1.0, n + 1) for o, s, n in zip(origin, box, cells, strict=True)]
     vertices = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 3)
     index = np.arange(len(vertices)).reshape([n + 1 for n in cells])
@@ -206,7 +210,7 @@ def tetrahedra(size: ArrayLike, cells: Sequence[int], at: ArrayLike = (0.0, 0.0,
 
 def _checked_elements(values: ArrayLike, count: int) -> Indices:
     """(m, 8) or (m, 4) indices of different vertices, of which each of `count` is used."""
-    array = np.array(values)
+    array = whole(values)
     if array.ndim != 2 or array.shape[1] not in FACES or not len(array) or not np.issubdtype(array.dtype, np.integer):
         got = (array.shape, str(array.dtype))
         fix = "give vertex indices, eight for a brick or four for a tetrahedron"

@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays.checks import finite
+from ..arrays.checks import check_kind, finite
 from ..errors import MeshError
 from . import bending_ratio, doubts, places, topology, validate
 from .places import Places
@@ -51,6 +51,7 @@ class TriangleMesh:
         vertices = validate.rows("vertices", self.vertices, 3)
         triangles = validate.checked_triangles(self.triangles, len(vertices))
         material = validate.checked_material(self.material, len(vertices), len(triangles))
+        check_kind("sets", self.sets, Mapping, "give lists of vertices by name", MeshError)
         sets = {name: _frozen(validate.checked_set(name, ids, len(vertices))) for name, ids in self.sets.items()}
         object.__setattr__(self, "vertices", _frozen(vertices))
         object.__setattr__(self, "triangles", _frozen(triangles))

@@ -7,9 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.checks import finite
 from ..errors import MeshError
-from . import topology
+from . import topology, validate
 from .topology import Indices
-from .validate import NO_AREA
 
 Array = NDArray[np.float64]
 
@@ -38,6 +37,8 @@ def unfold(vertices: Array, triangles: Indices, warp: ArrayLike = (1.0, 0.0, 0.0
     Raises:
         MeshError: a triangle has no area, or `warp` is perpendicular to a connected part.
     """
+    vertices = validate.rows("vertices", vertices, 3)
+    triangles = validate.checked_triangles(triangles, len(vertices))
     direction = finite("warp", warp, (3,), MeshError)
     normals = _normals(vertices[triangles])
     across = direction - normals * (normals @ direction)[:, None]  # the warp direction in every triangle's plane
@@ -113,7 +114,7 @@ def _normals(corners: Array) -> Array:
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.linalg.norm(normal, axis=1)
     longest = ((corners - np.roll(corners, 1, axis=1)) ** 2).sum(-1).max(axis=1)
-    flat = np.flatnonzero(size <= NO_AREA * longest)
+    flat = np.flatnonzero(size <= validate.NO_AREA * longest)
     if flat.size:
         raise MeshError("vertices", f"give triangle {flat[0]} no area", corners[flat[0]].tolist(), "remove or merge it")
     unit: Array = normal / size[:, None]

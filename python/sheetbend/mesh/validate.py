@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays.checks import finite
+from ..arrays.checks import finite, whole
 from ..errors import MeshError
 from . import topology
 from .topology import Indices
@@ -13,6 +13,8 @@ from .topology import Indices
 Array = NDArray[np.float64]
 
 NO_AREA = 1e-12  # of the square of the longest edge: rounding of the coordinates
+
+MOST_CELLS = 10**7  # of a mesh that is made
 
 
 def rows(name: str, values: ArrayLike, width: int) -> Array:
@@ -39,7 +41,7 @@ def vertices_within(vertices: Array, lower: ArrayLike, upper: ArrayLike) -> Indi
 
 def checked_triangles(values: ArrayLike, count: int) -> Indices:
     """(m, 3) indices of different vertices below `count`."""
-    array = np.array(values)
+    array = whole(values)
     if array.ndim != 2 or array.shape[1] != 3 or len(array) == 0 or not np.issubdtype(array.dtype, np.integer):
         got = (array.shape, str(array.dtype))
         raise MeshError("triangles", "must be whole numbers of shape (m, 3), m at least 1", got, "give vertex indices")

@@ -59,7 +59,7 @@ def wanted_refinement(given: Refinement | str | bool | None) -> Refinement:
     """
     if isinstance(given, Refinement):
         return given
-    if given == "auto" or given is True:
+    if given is True or (isinstance(given, str) and given == "auto"):
         return AUTO
     if given is None or given is False:
         return NONE

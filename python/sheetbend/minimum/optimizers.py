@@ -35,7 +35,7 @@ def named(optimizer: str) -> str:
     Raises:
         InputError: unknown, or Ceres asked for and not built.
     """
-    if optimizer not in OPTIMIZERS:
+    if not isinstance(optimizer, str) or optimizer not in OPTIMIZERS:
         raise InputError("optimizer", "is unknown", optimizer, f"use one of: {', '.join(OPTIMIZERS)}")
     if optimizer == "ceres" and not has_ceres():
         raise InputError(

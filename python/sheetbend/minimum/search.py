@@ -14,6 +14,7 @@ from functools import partial
 
 import numpy as np
 
+from ..arrays.checks import MOST_WHOLE, check_count, is_number, numbers
 from ..errors import InputError, SheetbendError
 from .approach import LEAST, Approach, Tally
 from .conditioning import Condition
@@ -27,6 +28,7 @@ from .starts import drawn, off_bounds
 from .windows import STEPS, TOLERANCE, along, chosen, cut, holds_frames
 
 AUTO = "auto"
+MOST_STARTS = 10**5
 NEAR_TOLERANCE = 1e-3  # of the cost: what is left is for the optimizer
 MUCH, DONE = 0.25, 1e-3  # of the cost: what a first step promises where the start is near, and at the minimum
 KEPT = 0.9  # of what such a step promises, that it takes off
@@ -67,17 +69,23 @@ class Search:
     progress: Observer | None = None
 
     def __post_init__(self) -> None:
-        if self.max_iterations < 1:
-            raise InputError("max_iterations", "must be positive", self.max_iterations, "give at least 1")
-        if not 0 < self.tolerance < 1:
+        check_count("max_iterations", self.max_iterations, 1, MOST_WHOLE, InputError)
+        if not is_number(self.tolerance) or not 0 < self.tolerance < 1:
             raise InputError("tolerance", "must lie between 0 and 1", self.tolerance, "give a relative change of cost")
+        if self.progress is not None and not callable(self.progress):
+            raise InputError("progress", "is no function", self.progress, "give one, or leave it out")
+        if isinstance(self.starts, int):
+            check_count("starts", self.starts, 0, MOST_STARTS, InputError)
+        elif not isinstance(self.starts, Sequence) or not all(isinstance(one, Mapping) for one in self.starts):
+            fix = "give values by the names of parameters for each start, or a number of starts"
+            raise InputError("starts", "must be a list of mappings", self.starts, fix)
         if isinstance(self.windows, str):
             if self.windows != AUTO:
                 raise InputError("windows", "are unknown", self.windows, "give lengths in s, [] for none, or 'auto'")
             return
-        w = np.array(self.windows, dtype=float)
-        if not (np.isfinite(w).all() and (np.diff(w, prepend=0.0) > 0).all()):
-            raise InputError("windows", "must be positive and increase", list(self.windows), "give lengths in s")
+        w = numbers("windows", self.windows, InputError)
+        if w.ndim != 1 or not (np.isfinite(w).all() and (np.diff(w, prepend=0.0) > 0).all()):
+            raise InputError("windows", "must be positive and increase", self.windows, "give lengths in s")
 
     def run(self, problem: FitProblem) -> Found:
         """Search from every start.

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays.checks import is_number
+from ..arrays.checks import check_kind, is_number
 from ..arrays.timeseries import Array
 from ..errors import InputError
 from ..experiment.experiment import Experiment
@@ -47,6 +47,12 @@ class Smooth:
 
     size: float | None = None
     length: float | None = None
+
+    def __post_init__(self) -> None:
+        for field in ("size", "length"):
+            value = getattr(self, field)
+            if value is not None and not (is_number(value) and value > 0):
+                raise InputError(f"smooth.{field}", "must be positive", value, "give a number, or leave it out")
 
 
 @dataclass(frozen=True)
@@ -88,15 +94,13 @@ def with_fields(
     objects = [o for e in experiments for o in (*e.scene.solids.values(), *e.scene.cloths.values())]
     known = {o.field.name: o.field for o in objects if o.field is not None}
     fields = []
+    check_kind("smooth", smooth, Mapping, "give sb.Smooth() by the names of fields")
     for name, wanted in smooth.items():
+        check_kind(f"smooth.{name}", wanted, Smooth, "give sb.Smooth()")
         if name not in known:
             fix = f"name one of: {', '.join(known) or 'none, give a cloth or a solid of clusters stiffness_modes'}"
             raise InputError(f"smooth.{name}", "names no field of the scenes", name, fix)
         modes = known[name]
-        for what in ("size", "length"):
-            value = getattr(wanted, what)
-            if value is not None and not (is_number(value) and value > 0):
-                raise InputError(f"smooth.{name}.{what}", "must be positive", value, "or leave it out to have it found")
         if twice := [mode for mode in modes.modes if mode in parameters]:
             fix = "leave them out of the parameters: smooth adds them"
             raise InputError(f"smooth.{name}", "has modes that are parameters already", twice, fix)

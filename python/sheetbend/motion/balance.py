@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..scene.scene import Array, Scene
-from .core_terms import divergence, substeps
+from .core_terms import compiled_of, divergence, substeps
 from .solver import Solver
 
 
@@ -58,7 +58,7 @@ def force_balance(scene: Scene, end: float, solver: Solver, values: Mapping[str,
     if solver.method != "implicit":
         fix = "use 'implicit': the others end after their iterations"
         raise InputError("solver.method", "balances no forces", solver.method, fix)
-    compiled = scene.compiled
+    compiled = compiled_of(scene)
     count = substeps([end], solver.h)[0]
     with divergence(scene):
         found = solver.core(compiled).force_balance(compiled.inputs(compiled.values(values)), count, 0.0)

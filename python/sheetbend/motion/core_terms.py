@@ -9,13 +9,24 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _core
-from ..arrays.checks import finite
+from ..arrays.checks import MOST_WHOLE, check_kind, finite
 from ..errors import DivergenceError, InputError, UnbalancedError, UnconvergedError
 from ..quantities.kinds import KINDS
+from ..scene.compiled import CompiledScene
 from ..scene.scene import Scene
 
-MOST_SUBSTEPS = 2**31 - 1
+MOST_SUBSTEPS = MOST_WHOLE
 """The largest number of substeps that the core counts."""
+
+
+def compiled_of(scene: Scene) -> CompiledScene:
+    """The compiled scene that a caller gave, which is frozen by this.
+
+    Raises:
+        InputError: it is no scene.
+    """
+    check_kind("scene", scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
+    return scene.compiled
 
 
 def start_of(scene: Scene, start: ArrayLike, error: type[InputError], field: str = "start") -> np.ndarray:

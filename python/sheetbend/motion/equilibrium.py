@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _core
-from ..arrays.checks import finite
+from ..arrays.checks import check_kind, finite, is_number, numbers
 from ..errors import NoEquilibriumError, SceneError, refusal
 from ..scene.scene import Scene
-from .core_terms import forces_by_group, over_all_nodes, pressures_by_volume, start_of
+from .core_terms import compiled_of, forces_by_group, over_all_nodes, pressures_by_volume, start_of
 from .redundancy import warn_redundant
 
 _FLAT = 1e-9  # of its extent: a sheet this near to a plane has no side to which it buckles
@@ -110,7 +110,7 @@ class Equilibrium:
             if positions_bar is None
             else over_all_nodes(
                 "positions_bar",
-                np.asarray(positions_bar, dtype=float),
+                numbers("positions_bar", positions_bar, SceneError),
                 self.nodes.shape,
                 self.scene.particle_count,
                 SceneError,
@@ -120,6 +120,8 @@ class Equilibrium:
             return self.solution.vjp(x_bar, None)
         lambda_bar = np.zeros(len(self.solution.multipliers))
         forces, pressures = forces_by_group(self.scene, lambda_bar), pressures_by_volume(self.scene, lambda_bar)
+        for argument, bars in (("forces_bar", forces_bar), ("pressures_bar", pressures_bar)):
+            check_kind(argument, {} if bars is None else bars, Mapping, "give derivatives by name", SceneError)
         for name, bar in (forces_bar or {}).items():
             self.scene.group(name)
             forces[name][...] = finite(f"forces_bar.{name}", bar, forces[name].shape, SceneError)
@@ -159,7 +161,7 @@ def equilibrium(
     Warns:
         RedundantConstraintsWarning: some rigid constraints follow from others at rest.
     """
-    compiled = scene.compiled
+    compiled = compiled_of(scene)
     theta = compiled.values(values)
     inputs = compiled.inputs(theta)
     x = None if start is None else whole_start(scene, start, inputs)
@@ -208,6 +210,9 @@ def equilibria(
     Raises:
         SceneError: as `equilibrium`.
     """
+    check_kind("starts", starts, Iterable, "give a list of positions to start from", SceneError)
+    if not (is_number(tolerance) and tolerance >= 0):
+        raise SceneError("tolerance", "must not be negative", tolerance, "give m")
     found: list[Equilibrium] = []
     for start in starts:
         try:

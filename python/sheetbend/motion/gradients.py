@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays.checks import check_count, is_number
 from ..errors import InputError
 from ..scene.compiled import CompiledScene
 from ..scene.domain import NOT_NEGATIVE, POSITIVE
 from ..scene.scene import Scene
-from .core_terms import divergence, substeps
+from .core_terms import MOST_SUBSTEPS, compiled_of, divergence, substeps
 from .gradient_probe import DIFFERENCES_BOUND, JITTERS, LOUD, Probe, jittered
 from .gradient_report import COMPLEX_STEP_BOUND, GradientReport, GradientRow
 from .solver import Solver
@@ -58,13 +59,14 @@ def check_gradients(
     Raises:
         InputError, DivergenceError: as `simulate`; times without a substep, or fewer than one sample.
     """
-    solver = Solver.given(solver)
+    solver, compiled = Solver.given(solver), compiled_of(scene)
     steps = substeps(times, solver.h)
     if steps[-1] == 0:
         raise InputError("times", "hold no substep to check", times, f"give frames up to {4 * solver.h:g} s or later")
-    if samples < 1:
-        raise InputError("samples", "must be positive", samples, "give at least 1")
-    compiled = scene.compiled
+    check_count("samples", samples, 1, MOST_SUBSTEPS, InputError)
+    check_count("seed", seed, 0, MOST_SUBSTEPS, InputError)
+    if seconds is not None and not (is_number(seconds) and seconds > 0):
+        raise InputError("seconds", "must be positive", seconds, "give s, or leave it out")
     core = solver.core(compiled)
     theta = compiled.values(values)
     inputs = compiled.inputs(theta)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-import math
 import re
 import types
 import typing
 from dataclasses import dataclass
 from typing import Any
 
+from ..arrays.checks import MOST_WHOLE, is_number
 from ..errors import InputError
 
 _KINDS = {int: "whole number", float: "number"}
@@ -42,7 +42,7 @@ class Limits:
     def hold(self, value: float) -> bool:
         """Whether a number is in the range."""
         return (
-            math.isfinite(value)
+            is_number(value)
             and (self.above is None or value > self.above)
             and (self.least is None or value >= self.least)
             and (self.most is None or value <= self.most)
@@ -86,6 +86,8 @@ class Option:
         if kind is None or str in branches:
             return
         number = isinstance(value, int if kind is int else int | float) and not isinstance(value, bool)
+        if kind is int and number and value > MOST_WHOLE:  # type: ignore[operator]
+            raise InputError(field, f"must be at most {MOST_WHOLE}", value, "give less")
         if not (number and self.limits.hold(typing.cast(float, value))):
             must = f"must be a {self.limits.noun or _KINDS[kind]} {self.limits.in_words}"
             usual = "" if self.default is None else f", such as {self.default:g}"

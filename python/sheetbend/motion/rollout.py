@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _core
+from ..arrays.checks import check_kind, numbers
 from ..errors import EmptyGradientError, InputError, choices
 from ..scene.scene import Scene
-from .core_terms import divergence, over_all_nodes, substeps
+from .core_terms import compiled_of, divergence, over_all_nodes, substeps
 from .solver import Solver
 from .tape import TapePlan, planned
 
@@ -57,6 +58,7 @@ class Gradient:
             InputError: a name that is no quantity of the scene.
             EmptyGradientError: to the first order none of these moves changes the loss by more than `rounding`.
         """
+        check_kind("scales", scales, Mapping, "give numbers by the names of quantities")
         unknown = [name for name in scales if name not in self.quantities]
         if unknown:
             fix = choices(unknown[0], self.quantities)
@@ -77,7 +79,7 @@ class Rollout:
     """
 
     def __init__(self, scene: Scene, times: ArrayLike, solver: Solver, values: Mapping[str, float] | None) -> None:
-        self._scene, self._solver, self._compiled = scene, solver, scene.compiled
+        self._scene, self._solver, self._compiled = scene, solver, compiled_of(scene)
         self._core = solver.core(self._compiled)
         self._steps = substeps(times, solver.h)
         self._theta = self._compiled.values(values)
@@ -105,7 +107,7 @@ class Rollout:
             DivergenceError: the gradient grew by more than 1/eps on its way back through the motion.
             UnconvergedError: as `rollout`.
         """
-        bar = np.asarray(positions_bar, dtype=float)
+        bar = numbers("positions_bar", positions_bar, InputError)
         bar = over_all_nodes("positions_bar", bar, self.nodes.shape, self._compiled.particles, InputError)
         with divergence(self._scene):
             inputs_bar, recomputed = self._core.reverse(self._inputs, self._tape, self._steps, bar, 0.0)

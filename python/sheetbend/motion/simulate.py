@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..files.memory import expect_room
 from ..scene.scene import Scene
 from .contact_counts import ContactCounts, contact_counts, contact_modes
-from .core_terms import divergence, forces_by_group, pressures_by_volume, start_of, substeps
+from .core_terms import compiled_of, divergence, forces_by_group, pressures_by_volume, start_of, substeps
 from .depth import deepest
 from .solver import Solver
 
@@ -80,7 +80,7 @@ def simulate(
         UnbalancedError: method "implicit" did not bring a substep's forces into balance; says when and where.
     """
     solver = Solver.given(solver)
-    compiled = scene.compiled
+    compiled = compiled_of(scene)
     steps = substeps(times, solver.h)
     inputs = compiled.inputs(compiled.values(values))
     if start is not None:

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from numpy.typing import ArrayLike
 
 from .. import _core
+from ..arrays.checks import check_count
 from ..errors import InputError
 from ..files.memory import expect_room, free_memory, in_words, least_in_words
 from ..scene.scene import Scene
-from .core_terms import substeps
+from .core_terms import MOST_SUBSTEPS, compiled_of, substeps
 from .solver import Solver
 
 
@@ -92,9 +93,8 @@ def tape_plan(scene: Scene, times: ArrayLike, solver: Solver | None = None, scen
             free memory.
     """
     solver = Solver.given(solver)
-    if not isinstance(scenes, int) or scenes < 1:
-        raise InputError("scenes", "must be a positive whole number", scenes, "give the size of the batch, at least 1")
-    return planned(solver.core(scene.compiled), substeps(times, solver.h), solver, solver.budget, scenes)
+    check_count("scenes", scenes, 1, MOST_SUBSTEPS, InputError)
+    return planned(solver.core(compiled_of(scene)), substeps(times, solver.h), solver, solver.budget, scenes)
 
 
 def planned(core: _core.Solver, steps: Sequence[int], solver: Solver, allowed: int, scenes: int = 1) -> TapePlan:

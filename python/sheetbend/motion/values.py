@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _core
+from ..arrays.checks import check_kind
 from ..quantities.kinds import KINDS
 from ..scene.group import Group
 from ..scene.scene import Array, Scene
-from .core_terms import forces_by_group
+from .core_terms import compiled_of, forces_by_group
 from .equilibrium import Equilibrium, whole_start
 
 
@@ -33,7 +34,7 @@ def constraint_values(
     Raises:
         SceneError: wrong shapes or names.
     """
-    compiled = scene.compiled
+    compiled = compiled_of(scene)
     inputs = compiled.inputs(compiled.values(values))
     x = scene.nodes.ravel() if positions is None else whole_start(scene, positions, inputs, "positions")
     C, _ = _core.evaluate_constraints(
@@ -60,7 +61,7 @@ def elastic_energy(
     Raises:
         SceneError: wrong shapes or names.
     """
-    compiled, energies = scene.compiled, {}
+    compiled, energies = compiled_of(scene), {}
     C_of = constraint_values(scene, positions, values)
     for group, alpha in _compliances(scene, compiled.inputs(compiled.values(values))):
         C = C_of[group.name]
@@ -96,6 +97,7 @@ def support_forces(rest: Equilibrium) -> Array:
         (nodes, 3) N, zero for free nodes: particles first, then hidden nodes such as the stub of a clamp, which carries
         a part of the clamp's moment.
     """
+    check_kind("rest", rest, Equilibrium, "give what sb.equilibrium returns")
     scene, compiled = rest.scene, rest.scene.compiled
     inputs = compiled.inputs(rest.theta)
     _, forces = _core.evaluate_constraints(compiled.core, inputs, rest.nodes.ravel(), rest.solution.multipliers)

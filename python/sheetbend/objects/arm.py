@@ -22,7 +22,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import finite
+from ..arrays.checks import check_kind, check_label, finite, is_number
 from ..errors import SceneError
 from ..quantities.quantities import Term
 from ..scene.scene import Scene
@@ -131,7 +131,7 @@ def add_pendulum(
 
 
 def _positive(field: str, value: float) -> None:
-    if not (math.isfinite(value) and value > 0.0):
+    if not is_number(value) or not value > 0.0:
         raise SceneError(field, "must be positive", value, "give a positive number")
 
 
@@ -174,6 +174,8 @@ def _hang(
 ) -> Arm:
     """Particles at points (along, across) of the arm, in parts of its length, the end first; their initial state by
     angle and rate."""
+    check_label("arm.name", name)
+    check_kind("scene", scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
     carrier = pivot if isinstance(pivot, Arm) else None
     root = pivot.root if isinstance(pivot, Arm) else finite(f"{name}.pivot", pivot, (3,), SceneError)
     scene.add_quantity(f"{name}_length", length, "m")

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import finite, is_number, points
+from ..arrays.checks import check_count, check_label, finite, is_number, points
 from ..errors import SceneError
 from ..quantities.quantities import ZERO_OR_MORE, product
 from ..scene.scene import Array, Scene
+
+MOST_LINKS = 10**6
 
 TimeConstant = tuple[float, dict[str, str]]
 """A constant and the functions of quantities that it multiplies."""
@@ -42,8 +44,8 @@ def straight_or_given(
     given: ArrayLike | None,
 ) -> tuple[Array, float]:
     """(segments + 1, 3) nodes of a rope along a way, see `straight_way`, or through given points, and its length."""
-    if not isinstance(segments, int | np.integer) or segments < 1:
-        raise SceneError(f"{name}.segments", "must be a positive whole number", segments, "give at least 1")
+    check_label("name", name)
+    check_count(f"{name}.segments", segments, 1, MOST_LINKS)
     if length is not None and not (is_number(length) and length > 0):
         raise SceneError(f"{name}.length", "must be positive", length, "give m")
     if given is not None:
@@ -96,9 +98,9 @@ def time_constants(
 
     if factor is None and frequency is None:
         return own("stretch", stretch), own("bend", bend)
-    if factor is None or not factor > 0:
+    if factor is None or not is_number(factor) or not factor > 0:
         raise SceneError(f"{name}.loss_factor", "must be positive", factor, "give it together with loss_frequency")
-    if frequency is None or not frequency > 0:
+    if frequency is None or not is_number(frequency) or not frequency > 0:
         raise SceneError(
             f"{name}.loss_frequency", "must be positive", frequency, "give the frequency of the motion in Hz"
         )

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import check_positive, finite, indices, is_number
+from ..arrays.checks import check_count, check_kind, check_label, check_positive, finite, is_number, some_indices
 from ..errors import SceneError
 from ..mesh import TriangleMesh
 from ..quantities.quantities import Term
@@ -24,6 +24,7 @@ from .sheet_bending import SheetCurvature
 from .stiffness_field import StiffnessField, field_of_triangles
 from .yielding import check_yield
 
+MESH = "give a TriangleMesh, such as sb.mesh.equilateral(...) or sb.read_mesh(path)"
 MODELS = ("curvature", "dihedral", "isometric_bending")
 
 
@@ -76,7 +77,8 @@ def cloth(
         SceneError: wrong or missing values; the message names the field.
     """
     scene = Scene(name, gravity)
-    still = indices("cloth.pinned", pinned, len(mesh.vertices)) if np.size(pinned) else []
+    check_kind("cloth.mesh", mesh, TriangleMesh, MESH, SceneError)
+    still = some_indices("cloth.pinned", pinned, len(mesh.vertices))
     given = {"held": still, **options}
     built = add_cloth(scene, mesh, name, density=density, warp=warp, shear=shear, **given)  # type: ignore[arg-type]
     if len(still):
@@ -164,9 +166,11 @@ def add_cloth(
     Raises:
         SceneError: wrong or missing values, or others than those of a cut before; a mesh whose diagonals bias bending.
     """
-    if not isinstance(mesh, TriangleMesh):
-        fix = "give a TriangleMesh, such as sb.mesh.equilateral(...) or sb.read_mesh(path)"
-        raise SceneError(f"{name}.mesh", "is no mesh", mesh, fix)
+    check_label("cloth.name", name)
+    check_kind("scene", scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
+    check_kind(f"{name}.mesh", mesh, TriangleMesh, MESH, SceneError)
+    if not isinstance(law, Law | None):
+        raise SceneError(f"{name}.law", "is no law", law, "give such as sb.laws.Sinh(warp, weft, shear)")
     needed = {"density": density, "warp": warp, "shear": shear}
     optional = {
         "weft": weft,
@@ -190,8 +194,7 @@ def add_cloth(
         mesh.vertices if positions is None else finite(f"{name}.positions", positions, mesh.vertices.shape, SceneError)
     )
     free = np.ones(len(shape), dtype=bool)
-    if np.size(held):
-        free[indices(f"{name}.held", held, len(shape))] = False
+    free[some_indices(f"{name}.held", held, len(shape))] = False
 
     speeds = None if velocity is None else finite(f"{name}.velocity", velocity, shape.shape, SceneError)
     particles = scene.add_particles(shape, 0.0, speeds)
@@ -200,6 +203,7 @@ def add_cloth(
     _weigh(cut, density, drag_linear, drag_quadratic)
     kept = np.flatnonzero(free[mesh.triangles].any(axis=1))
     varying = None
+    check_count(f"{name}.stiffness_modes", stiffness_modes, 0, len(mesh.triangles))
     if stiffness_modes:
         varying = field_of_triangles(scene, mesh, name, f"{fabric}_warp", stiffness_modes, kept)
     _membrane(cut, kept, (warp, weft, shear, poisson), law or Linear(), membrane_damping, varying)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from ..arrays.checks import check_positive
+from ..arrays.checks import check_positive, is_number
+from ..errors import SceneError
 from .laws import COMPONENTS, Exponential, Law, Linear, Sinh, Spline, Stiffening
 
 # The laws stood here before, and pickles find them here.
@@ -41,6 +42,10 @@ class Fabric:
         given = {field: getattr(self, field) for field in ("density", "warp", "shear", "bending")}
         left_out = {field: getattr(self, field) for field in ("weft", "bending_weft", "bending_twist")}
         check_positive("fabric", given, left_out)
+        if not (is_number(self.poisson) and -1 < self.poisson < 1):
+            raise SceneError("fabric.poisson", "must lie between -1 and 1", self.poisson, "give sqrt(nu_uv nu_vu)")
+        if not isinstance(self.law, Law):
+            raise SceneError("fabric.law", "is no law", self.law, "give such as sb.laws.Sinh(warp, weft, shear)")
 
     def options(self) -> dict[str, Any]:
         """What `add_cloth` takes: `add_cloth(scene, mesh, **fabric.options())`."""

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..arrays.checks import is_number
 from ..errors import SceneError
 from ..mesh import TriangleMesh
 from ..quantities.quantities import Term
@@ -46,7 +47,7 @@ class FlatSize(NamedTuple):
                 made.append(None)
                 continue
             where = f"{name}.{field}"
-            if not LIMITS[0] <= value <= LIMITS[1]:
+            if not is_number(value) or not LIMITS[0] <= value <= LIMITS[1]:
                 fix = "give the size of the flat cloth over that of the mesh, such as 1.0, or make the mesh larger"
                 raise SceneError(where, f"must lie between {LIMITS[0]} and {LIMITS[1]}", value, fix)
             if mesh.material.ndim != 2:

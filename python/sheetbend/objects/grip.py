@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import finite
+from ..arrays.checks import check_kind, finite, is_number, numbers
 from ..arrays.rigid import rigid_motion
 from ..arrays.rotations import rotated, unit_quaternions
 from ..arrays.smoothing import smoothed
@@ -75,6 +75,7 @@ class Grip:
         x = x + rotated(q, finite("offset", offset, (3,), SceneError))
         along, second = rotated(q, d), rotated(q, finite("director", director, (3,), SceneError))
         if frame is not None:
+            check_kind("frame", frame, HandEye, "give sb.HandEye(name, position, quaternion)", SceneError)
             x, along, second = frame.points(x), frame.directions(along), frame.directions(second)
         return cls(t, x, along, _across(along, second), frame)
 
@@ -134,7 +135,7 @@ class Grip:
             SceneError: shapes, times that do not increase, fewer than three markers seen in a frame, markers on a line.
         """
         t = _knots(times)
-        x = np.asarray(markers, dtype=float)
+        x = numbers("markers", markers, SceneError)
         if x.ndim != 3 or len(x) != len(t) or x.shape[1] < 3 or x.shape[2] != 3:
             raise SceneError("markers", "have the wrong shape", x.shape, f"give ({len(t)}, 3 or more, 3) in m")
         turns, centers, _ = rigid_motion(x)
@@ -146,6 +147,8 @@ class Grip:
     def smoothed(self, width: float) -> Grip:
         """The same grip with its motion smoothed over `width` s (`smoothing.smoothed`); a grip that does not move is
         returned as it is."""
+        if not is_number(width):
+            raise SceneError("width", "must be a number", width, "give s; 0 leaves the motion as it is")
         if self.stays or width <= 0 or len(self.times) < 2:
             return self
         x, d, q = (smoothed(self.times, v, width)[0] for v in (self.position, self.direction, self.director))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..arrays.checks import is_number
 from ..errors import SceneError
 from ..quantities.quantities import Term, product
 from ..scene.in_frame import add_motion_in_frame
@@ -75,7 +76,7 @@ class Lead:
     """
 
     def __init__(self, scene: Scene, end: str, grip: Grip, length: float, nodes: Array, link: float) -> None:
-        self.count = round(length / link)
+        self.count = round(length / link) if is_number(length) else 0
         if not 1 <= self.count < len(nodes):
             fix = f"give {0.5 * link:g} to {link * (len(nodes) - 1):g} m, or leave it out"
             raise SceneError(f"{end}_lead", "is no part of the rope that has a link", length, fix)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import finite, is_number
+from ..arrays.checks import check_label, finite, is_number, vectors
 from ..arrays.rotations import rotated, unit_quaternions
 from ..errors import InputError, SceneError
 from ..quantities.expression import rotation_products
@@ -62,6 +62,7 @@ class HandEye:
         quaternion: ArrayLike = (0.0, 0.0, 0.0, 1.0),
         about: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:
+        check_label("hand_eye.name", name)
         object.__setattr__(self, "name", name)
         object.__setattr__(self, "position", finite(f"{name}.position", position, (3,), SceneError))
         object.__setattr__(self, "quaternion", unit_quaternions(f"{name}.quaternion", quaternion, (4,)))
@@ -78,7 +79,7 @@ class HandEye:
 
     def directions(self, d: ArrayLike) -> Array:
         """Directions (..., 3) of the poses' frame in the recording's frame, without the correction."""
-        return rotated(self.quaternion, np.asarray(d, dtype=float))
+        return rotated(self.quaternion, vectors(f"{self.name}.points", d))
 
     def corrected(self, x: Array, values: Mapping[str, float]) -> Array:
         """Points (..., 3) m of the recording's frame, moved by the correction; quantities not in `values` are zero."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import finite, is_number
+from ..arrays.checks import check_kind, check_label, finite, is_number
 from ..errors import SceneError
 from ..quantities.expression import Array, Expression, cross, expressions, numbers, terms_of, vector
 from ..quantities.quantities import ZERO_OR_MORE, Term
@@ -51,6 +51,7 @@ class Joint:
 
 def ground(scene: Scene) -> Body:
     """The body that stands for the world: pinned at its origin, along its axes. It has no quantities."""
+    check_kind("scene", scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
     if GROUND not in scene.bodies:
         x, mass = np.vstack([np.zeros(3), np.eye(3)]), np.array([1.0, 1e-12, 1e-12, 1e-12])
         nodes = scene.add_hidden(x, mass, pinned=True)
@@ -72,6 +73,7 @@ class Making:
         name: str,
         across: ArrayLike | None = None,
     ) -> None:
+        check_label("joint.name", name)
         if not isinstance(lower, Body) or not isinstance(upper, Body | None):
             fix = "give what Scene.add_body returns; None is the ground, above"
             raise SceneError(f"{name}.lower", "is no body", (upper, lower), fix)

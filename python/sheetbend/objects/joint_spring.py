@@ -143,6 +143,8 @@ def _angle(made: Making, label: str, dial: int, stiffness: float | None, rest: f
 
 
 def _knots(field: str, knots: Knots) -> tuple[Array, Array]:
+    if not isinstance(knots, tuple | list) or len(knots) != 2:
+        raise SceneError(field, "must be a pair", knots, "give (times, values), both (knots,)")
     t = finite(f"{field}.times", knots[0], None, SceneError).ravel()
     check_increasing(f"{field}.times", t)
     return t, finite(field, knots[1], (len(t),), SceneError)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import finite
+from ..arrays.checks import check_count, check_kind, finite, is_number, vectors
 from ..errors import SceneError
 from ..mesh import Places
 from ..quantities.expression import Array, Expression, expressions
@@ -19,6 +19,8 @@ from ..scene.scene import Scene
 from .cloth import Cloth
 from .rope import Rope
 from .solid import Solid, SolidSurface
+
+MOST_MARKERS = 10**6
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,7 @@ def between(first: int, second: int, fraction: float) -> Place:
     Raises:
         SceneError: not the numbers of particles.
     """
-    f = float(fraction)
+    f = float(finite("fraction", fraction, (), SceneError))
     return Place((_number("first", first), _number("second", second)), (1.0 - f, f), (-1.0, 1.0))
 
 
@@ -100,7 +102,8 @@ def _number(field: str, particle: object) -> int:
 
 def on_body(body: Body, points: ArrayLike) -> tuple[Place, ...]:
     """Markers at points (k, 3) m of a rigid body, in the body's frame."""
-    x = finite("points", points, (len(np.atleast_2d(np.asarray(points))), 3), SceneError)
+    check_kind("body", body, Body, "give what Scene.add_body returns", SceneError)
+    x = np.atleast_2d(vectors("points", points))
     nodes = tuple(int(p) for p in body.particles)
     return tuple(Place(nodes, (1.0, 0.0, 0.0, 0.0), (0.0,) * 4, tuple(p), body=body) for p in x.tolist())
 
@@ -118,7 +121,7 @@ def on_rope(rope: Rope, arc_length: float, interpolation: str = "cubic") -> Plac
     """
     _check_rope(rope)
     s, nodes = rope.arc_length, rope.particles
-    if not -1e-9 * s[-1] <= arc_length <= s[-1] * (1.0 + 1e-9):
+    if not is_number(arc_length) or not -1e-9 * s[-1] <= arc_length <= s[-1] * (1.0 + 1e-9):
         raise SceneError("arc_length", f"lies beyond the rope '{rope.name}'", arc_length, f"use 0 to {s[-1]:g} m")
     if interpolation not in ("cubic", "linear"):
         raise SceneError("interpolation", "is unknown", interpolation, "use 'cubic' or 'linear'")
@@ -139,6 +142,7 @@ def along_rope(rope: Rope, count: int, interpolation: str = "cubic") -> tuple[Pl
         interpolation: as of `on_rope`.
     """
     _check_rope(rope)
+    check_count("count", count, 1, MOST_MARKERS)
     return tuple(on_rope(rope, s, interpolation) for s in np.linspace(0.0, rope.length, count))
 
 
@@ -146,6 +150,7 @@ def _check_rope(rope: object) -> None:
     if isinstance(rope, Scene):
         known = " or ".join(f"scene.ropes[{name!r}]" for name in rope.ropes) or "what sb.add_rope returns"
         raise SceneError("rope", "is a scene", rope.name, f"give one rope of it, {known}")
+    check_kind("rope", rope, Rope, "give what sb.add_rope or sb.add_rod returns", SceneError)
 
 
 def on_cloth(cloth: Cloth, points: ArrayLike) -> tuple[Place, ...]:
@@ -158,6 +163,7 @@ def on_cloth(cloth: Cloth, points: ArrayLike) -> tuple[Place, ...]:
     Raises:
         MeshError: a point lies outside of the cloth.
     """
+    check_kind("cloth", cloth, Cloth, "give what sb.add_cloth returns", SceneError)
     return on_mesh(cloth, cloth.mesh.at(points))
 
 
@@ -177,6 +183,7 @@ def on_solid(solid: Solid, points: ArrayLike) -> tuple[Place, ...]:
     Raises:
         MeshError: a point lies outside of the solid.
     """
+    check_kind("solid", solid, Solid, "give what sb.add_solid returns", SceneError)
     places = solid.mesh.at(points)
     found = []
     for vertices, weights in zip(solid.particles[places.vertices].tolist(), places.weights.tolist(), strict=True):
@@ -252,6 +259,8 @@ def _places_for(
         if unknown:
             raise SceneError("markers", "are not in the recording", unknown, f"name some of: {', '.join(names)}")
         return tuple(markers.get(name) for name in names)
+    if isinstance(markers, str) or not isinstance(markers, Sequence | np.ndarray):
+        raise SceneError("markers", "must be places", markers, "give a list of places, or a mapping by name")
     if len(markers) != len(names):
         raise SceneError(
             "markers", "do not match the recording's", len(markers), f"give {len(names)} places, or a mapping by name"

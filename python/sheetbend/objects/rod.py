@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import check_positive
+from ..arrays.checks import check_count, check_kind, check_label, check_positive
 from ..errors import SceneError
 from ..quantities.quantities import product
 from ..scene.body import BodyPoint
 from ..scene.scene import Array, Scene
-from .chain import add_drag, add_links, add_masses
+from .chain import MOST_LINKS, add_drag, add_links, add_masses
 from .grip import Grip
 from .grip_freedom import spread_shift
 from .rod_end import End, check_roll, spread_roll
@@ -178,7 +178,10 @@ def add_rod(
         },
     )
     check_yield(name, yield_curvature, yield_share, "EI")
-    _check_whole(name, segments, turns)
+    check_label("rod.name", name)
+    check_kind("scene", scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
+    check_count(f"{name}.segments", segments, 2, MOST_LINKS)
+    check_count(f"{name}.turns", turns, -MOST_LINKS, MOST_LINKS)
     for label, damping, of, stiffness in (("stretch", stretch_damping, "EA", EA), ("shear", shear_damping, "GA", GA)):
         if damping is not None and stiffness is None:
             fix = f"give {of}, or leave it out"
@@ -266,15 +269,6 @@ def _hold_ends(
     if roll:
         shares = np.linspace(0.0 if ends[0].held else 1.0, 1.0, len(frames.directors))
         spread_roll(scene, f"{line.name}_roll", frames.directors[:-1], shares[:-1])
-
-
-def _check_whole(name: str, segments: int, turns: int) -> None:
-    """Raises SceneError where segments or turns are no whole numbers, or there are fewer than two segments."""
-    for option, value, least in (("segments", segments, 2), ("turns", turns, None)):
-        if not isinstance(value, int | np.integer) or (least is not None and value < least):
-            wanted = "must be a whole number" + ("" if least is None else f" from {least} on")
-            fix = "give whole turns; grips give the rest" if least is None else f"give at least {least}"
-            raise SceneError(f"{name}.{option}", wanted, value, fix)
 
 
 def _check_grips(name: str, ends: tuple[End, End], tilts: bool, shifts: bool, roll: bool) -> None:

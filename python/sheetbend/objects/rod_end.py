@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -143,8 +143,10 @@ class End:
 def check_roll(name: str, ends: Sequence[str], held: Sequence[str]) -> None:
     """Raises SceneError where `hold_roll` names something else than an end, or one that a grip, a junction or a body
     holds."""
+    if isinstance(ends, str) or not isinstance(ends, Collection):
+        raise SceneError(f"{name}.hold_roll", "must be a list of ends", ends, 'give ("start",), ("end",) or both')
     for end in ends:
-        if end not in ("start", "end"):
+        if not isinstance(end, str) or end not in ("start", "end"):
             raise SceneError(f"{name}.hold_roll", "names no end", end, 'give "start", "end" or both')
         if end in held:
             raise SceneError(f"{name}.hold_roll", "names an end whose roll is held already", end, "leave it out")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import check_positive, indices
+from ..arrays.checks import check_kind, check_positive, some_indices
 from ..errors import SceneError
 from ..scene.body import BodyPoint
 from ..scene.scene import Array, Scene
@@ -85,8 +85,8 @@ def rope(
     """
     scene = Scene(name, gravity)
     built = add_rope(scene, name, length=length, segments=segments, density=density, EA=EA, EI=EI, **options)  # type: ignore[arg-type]
-    if np.size(pinned):
-        scene.pin(built.particles[indices("rope.pinned", pinned, len(built.particles))])
+    if held := some_indices("rope.pinned", pinned, len(built.particles)):
+        scene.pin(built.particles[held])
     return scene
 
 
@@ -164,6 +164,7 @@ def add_rope(
     Raises:
         SceneError: wrong or missing values; the message names the field.
     """
+    check_kind("scene", scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
     way = straight_way(direction, clamp_start, clamp_end)
     shape, length = straight_or_given(name, length, segments, start, way, points)
     grips = checked_grips(name, (grip_start, grip_end), (clamp_start, clamp_end))
@@ -174,7 +175,7 @@ def add_rope(
         ("start_lead", start_lead, gripped[0]),
         ("end_lead", end_lead, gripped[1]),
     ):
-        if asked and not possible:
+        if asked is not None and asked is not False and not possible:
             raise SceneError(f"{name}.{field}", "needs a grip", asked, "give grip_start or grip_end")
     speeds = None
     if velocity is not None or any(grips):

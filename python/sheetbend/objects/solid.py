@@ -11,7 +11,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import check_positive, finite, indices, is_number
+from ..arrays.checks import check_kind, check_label, check_positive, finite, is_number, some_indices
 from ..errors import SceneError
 from ..mesh import SolidMesh, TriangleMesh
 from ..quantities.quantities import Term
@@ -89,7 +89,8 @@ def solid(
         SceneError: wrong or missing values; the message names the field.
     """
     scene = Scene(name, gravity)
-    still = indices("solid.pinned", pinned, len(mesh.vertices)) if np.size(pinned) else []
+    check_kind("solid.mesh", mesh, SolidMesh, "give such as sb.mesh.bricks(size, cells)", SceneError)
+    still = some_indices("solid.pinned", pinned, len(mesh.vertices))
     given = {"held": still, **options}
     built = add_solid(scene, mesh, name, density=density, **given)  # type: ignore[arg-type]
     if still:
@@ -163,6 +164,9 @@ def add_solid(
     Raises:
         SceneError: wrong or missing values, or others than those of a solid of the same material before.
     """
+    check_label("solid.name", name)
+    check_kind("scene", scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
+    check_kind(f"{name}.mesh", mesh, SolidMesh, "give such as sb.mesh.bricks(size, cells)", SceneError)
     numbers = _checked_numbers(name, density, E, poisson, orthotropic, clusters, damping, law, volume_row)
     numbers |= check_plastic(name, yield_stress, hardening, mesh, numbers)
     _check_modes(name, stiffness_modes, clusters, E)
@@ -172,8 +176,7 @@ def add_solid(
     shape = mesh.vertices if positions is None else finite(f"{name}.positions", positions, (count, 3), SceneError)
     moving = None if velocities is None else finite(f"{name}.velocities", velocities, (count, 3), SceneError)
     free = np.ones(count, dtype=bool)
-    if np.size(held):
-        free[indices(f"{name}.held", held, count)] = False
+    free[some_indices(f"{name}.held", held, count)] = False
     if not free.any():
         raise SceneError(f"{name}.held", "are all vertices", count, "leave some free")
     if mesh.elements.shape[1] == 4 and clusters is None:
@@ -212,7 +215,11 @@ def _checked_numbers(
     rubber = law == "neo_hookean"
     check_positive(name, {"density": density}, {"damping": damping})
     others = {"poisson": poisson, "law": law if rubber else None, "volume_row": volume_row or None}
+    if clusters is not None and not isinstance(clusters, Sequence):
+        raise SceneError(f"{name}.clusters", "must be a list", clusters, "give lists of vertices")
     if orthotropic is not None:
+        fix = "give sb.Orthotropic(E, G, poisson, axes)"
+        check_kind(f"{name}.orthotropic", orthotropic, Orthotropic, fix, SceneError)
         _refuse_beside(name, "orthotropic", {"E": E, "clusters": clusters and len(clusters), **others})
         return {"density": density, "orthotropic": orthotropic, "damping": damping}
     if clusters is not None:
@@ -259,7 +266,8 @@ def _moduli(name: str, E: ArrayLike | None, count: int) -> float | tuple[float, 
         raise SceneError(
             f"{name}.clusters", "are none", 0, "give lists of vertices, such as sb.cluster_boxes(mesh, size)"
         )
-    values = finite(f"{name}.E", E, () if np.ndim(E) == 0 else (count,), SceneError)
+    values = finite(f"{name}.E", E, None, SceneError)
+    values = values if values.ndim == 0 else finite(f"{name}.E", values, (count,), SceneError)
     if not (values > 0).all():
         raise SceneError(f"{name}.E", "must be positive", values.tolist(), "give Pa")
     return float(values) if values.ndim == 0 else tuple(values.tolist())

@@ -15,7 +15,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import finite, indices
+from ..arrays.checks import check_kind, finite, indices
 from ..errors import SceneError
 from ..mesh import SolidMesh
 from ..quantities.quantities import Term
@@ -41,6 +41,7 @@ def cluster_boxes(mesh: SolidMesh, size: float) -> list[Array]:
     Raises:
         SceneError: a size that is not positive, or no box with vertices in all directions.
     """
+    check_kind("clusters.mesh", mesh, SolidMesh, "give such as sb.mesh.bricks(size, cells)", SceneError)
     length = float(finite("clusters.size", size, (), SceneError))
     if not length > 0:
         raise SceneError("clusters.size", "must be positive", length, "give m, several elements")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import indices, is_number
+from ..arrays.checks import check_kind, indices, is_number
 from ..errors import SceneError
 from ..optional import require
 from ..scene.scene import Scene
@@ -32,9 +32,13 @@ def add_tethers(
         SceneError: no anchors, or a negative stretch or compliance.
         MissingExtraError: scipy is not installed (extra `fit`).
     """
+    check_kind("scene", scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
+    check_kind("cloth", cloth, Cloth, "give what sb.add_cloth returns")
     name = f"{cloth.name}_tethers"
     if not (is_number(stretch) and stretch >= 0):
         raise SceneError(f"{name}.stretch", "must not be negative", stretch, "give a strain such as 0.02")
+    if not (is_number(compliance) and compliance >= 0):
+        raise SceneError(f"{name}.compliance", "must not be negative", compliance, "give m/N, or 0")
     count = len(cloth.mesh.vertices)
     fixed = np.isin(cloth.particles, [*scene.pinned, *scene.boundary.driven])
     chosen = np.flatnonzero(fixed) if anchors is None else indices(f"{name}.anchors", anchors, count)

@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import finite, is_number
+from ..arrays.checks import check_kind, finite, is_number, vectors
 from ..arrays.poses import checked_poses, poses_at
 from ..arrays.rotations import rotated, rotation_vectors
 from ..errors import SceneError
@@ -82,7 +82,7 @@ class Tool:
 
     def shifted(self, t0: float) -> Tool:
         """The same poses on a clock whose zero is the old time t0, s."""
-        return replace(self, times=self.times - t0)
+        return replace(self, times=self.times - finite("t0", t0, (), SceneError))
 
     def between(self, start: float, stop: float) -> Tool:
         """The poses that a motion from `start` to `stop` s needs: those within, and two more on either side.
@@ -90,6 +90,8 @@ class Tool:
         Raises:
             SceneError: the poses begin later or end earlier.
         """
+        finite("start", start, (), SceneError)
+        finite("stop", stop, (), SceneError)
         if self.times[0] > start + COVERED or self.times[-1] < stop - COVERED:
             span = f"{self.times[0]:.6g} to {self.times[-1]:.6g} s"
             fix = f"they reach from {span}: start later, cut the recording, or set its clock right"
@@ -101,20 +103,20 @@ class Tool:
 
     def path(self, points: ArrayLike) -> Array:
         """(poses, k, 3) m: where points (k, 3) m in the tool's axes are in the recording's frame, uncorrected."""
-        arm = rotated(self.quaternions[:, None], np.asarray(points, dtype=float)[None])
+        arm = rotated(self.quaternions[:, None], vectors("points", points)[None])
         return self.frame.points(self.positions[:, None] + arm)
 
     def placed(self, points: ArrayLike, time: float = 0.0) -> Array:
         """(k, 3) m: where points in the tool's axes are in the recording's frame at a time, uncorrected."""
         position, quaternion = self._pose(time)
-        return self.frame.points(position + rotated(quaternion, np.asarray(points, dtype=float)))
+        return self.frame.points(position + rotated(quaternion, vectors("points", points)))
 
     def held(self, x: ArrayLike, time: float = 0.0) -> Array:
         """(k, 3) m: the places in the tool's axes of points (k, 3) m of the recording's frame at a time; `placed`
         backwards."""
         position, quaternion = self._pose(time)
         back = np.array([-1.0, -1.0, -1.0, 1.0])
-        own = rotated(back * self.frame.quaternion, np.asarray(x, dtype=float) - self.frame.position)
+        own = rotated(back * self.frame.quaternion, vectors("x", x) - self.frame.position)
         return rotated(back * quaternion, own - position)
 
     def drive(self, scene: Scene, particles: ArrayLike, points: ArrayLike | None = None) -> None:
@@ -129,7 +131,8 @@ class Tool:
         Raises:
             SceneError: shapes, NaN, or particles that are driven already.
         """
-        which = np.atleast_1d(np.asarray(particles))
+        check_kind("scene", scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
+        which = scene.node_array("tool.particles", particles)
         at = self.held(scene.nodes[which]) if points is None else points
         path = self.path(finite("tool.points", at, (len(which), 3), SceneError))
         self.frame.drive(scene, which, self.times, path)
@@ -152,6 +155,8 @@ class Tool:
         if self.flex is not None:
             fix = "leave out flex, or give the motion by Collider.moving"
             raise SceneError("tool.flex", "is that of a rod that bends, which no collider follows", self.flex, fix)
+        if not hasattr(collider, "poses"):
+            raise SceneError("collider", "is no shape", collider, "give a Plane, Sphere, Capsule, Cylinder or Box")
         origin = collider.poses.positions[0]
         moved = self.path(self.held(origin[None]))[:, 0] - origin
         x, w = np.split(self._pose(0.0)[1], [3])
@@ -170,7 +175,7 @@ class Tool:
 
     def _pose(self, time: float) -> tuple[Array, Array]:
         """Position (3,) and unit quaternion (4,) at a time."""
-        return poses_at(self.times, self.positions, self.quaternions, time)
+        return poses_at(self.times, self.positions, self.quaternions, finite("time", time, (), SceneError))
 
 
 def accelerations(times: Array, x: Array) -> Array:

@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from ..arrays.checks import is_number
+from ..arrays.checks import is_bound, is_number
 from ..arrays.timeseries import Array
 from ..errors import InputError
 
@@ -68,7 +68,7 @@ class Parameter:
             self._check_value()
         else:
             self._check_tie()
-        if self.scale is not None and not (math.isfinite(self.scale) and self.scale > 0):
+        if self.scale is not None and not (is_number(self.scale) and self.scale > 0):
             self._fail("scale", "must be a size", self.scale, "give a positive number, such as 0.1 rad for an angle")
 
     def _fail(self, field: str, problem: str, got: object, fix: str) -> NoReturn:
@@ -78,11 +78,11 @@ class Parameter:
         initial = self.initial
         if initial is None and self.private:
             return  # checked when expanded, with the values of the scenes
-        if initial is None or not math.isfinite(initial):
+        if initial is None or not is_number(initial):
             self._fail("initial", "must be a finite number", initial, "give a starting value")
         for bound in ("lower", "upper"):
             value = getattr(self, bound)
-            if not is_number(value) and value not in (-math.inf, math.inf):
+            if not is_bound(value):
                 self._fail(bound, "must be a number", value, f"give one, or leave {bound} out for none")
         if not self.lower < self.upper:
             problem = f"must be below upper, which is {self.upper:g}"
@@ -102,7 +102,7 @@ class Parameter:
     def _check_prior(self, prior: tuple[float, float]) -> None:
         if self.fixed:
             self._fail("prior", "has no effect on a fixed parameter", self.prior, "free it, or drop the prior")
-        if len(prior) != 2 or not all(math.isfinite(part) for part in prior):
+        if not isinstance(prior, Sequence) or len(prior) != 2 or not all(is_number(part) for part in prior):
             self._fail("prior", "must be two finite numbers", self.prior, "give (mean, sd)")
         mean, sd = prior
         if sd <= 0:
@@ -118,9 +118,9 @@ class Parameter:
         if self.fixed:
             self._fail("fixed", problem, True, f"fix {self.tied_to}, or drop the tie")
         for bound in ("lower", "upper"):
-            if math.isfinite(getattr(self, bound)):
+            if is_number(getattr(self, bound)):
                 self._fail(bound, problem, getattr(self, bound), f"set {bound} of {self.tied_to}")
-        if not math.isfinite(self.factor) or self.factor == 0:
+        if not is_number(self.factor) or self.factor == 0:
             self._fail("factor", "must be finite and not zero", self.factor, "give the ratio of the two values")
 
     @property
@@ -151,7 +151,11 @@ class Parameters(Mapping[str, Parameter]):
 
     def __init__(self, parameters: Iterable[Parameter]) -> None:
         self._parameters: dict[str, Parameter] = {}
+        if isinstance(parameters, str) or not isinstance(parameters, Iterable):
+            raise InputError("parameters", "must be a list", parameters, "give [sb.Parameter(name=...)]")
         for parameter in parameters:
+            if not isinstance(parameter, Parameter):
+                raise InputError("parameters", "hold no Parameter", parameter, "give sb.Parameter(name=...)")
             if parameter.name in self._parameters:
                 raise InputError("parameters", "hold a name twice", parameter.name, "give each a name of its own")
             self._parameters[parameter.name] = parameter

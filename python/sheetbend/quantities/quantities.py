@@ -16,6 +16,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays.checks import check_label, is_bound, is_number
 from ..errors import SceneError
 
 FUNCTIONS = {"identity": 0, "inverse": 1, "square": 2, "sin": 3, "cos": 4, "sqrt": 5, "inverse_sqrt": 6, "exp": 7}
@@ -46,8 +47,13 @@ class Quantity:
     beyond: str = "no value beyond makes sense: doubt the model"
 
     def __post_init__(self) -> None:
-        if not math.isfinite(self.value):
+        check_label("quantity", self.name)
+        if not is_number(self.value):
             raise SceneError(self.name, "must be a finite number", self.value, f"give a value in {self.unit}")
+        object.__setattr__(self, "value", float(self.value))
+        for field, bounds in (("scale", (self.scale,)), ("limits", self.limits or ())):
+            if not isinstance(bounds, tuple | list) or not all(b is None or is_bound(b) for b in bounds):
+                raise SceneError(f"{self.name}.{field}", "must be numbers", bounds, "give numbers, or leave it out")
         if self.positive and not self.value > 0.0:
             raise SceneError(self.name, "must be positive", self.value, f"give a positive value in {self.unit}")
 

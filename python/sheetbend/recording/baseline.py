@@ -26,6 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays.checks import check_kind
 from ..arrays.timeseries import Array, mean_position
 from ..errors import RecordingError
 from .cloud import Cloud
@@ -81,8 +82,8 @@ def rest_baseline(fitted: Recording | Sequence[Recording]) -> Array:
     Raises:
         RecordingError: the recordings have different markers, or there is none.
     """
-    recordings = [fitted] if isinstance(fitted, Recording) else list(fitted)
-    if not recordings:
+    recordings = [fitted] if isinstance(fitted, Recording) else list(fitted) if isinstance(fitted, Sequence) else []
+    if not recordings or not all(isinstance(r, Recording) for r in recordings):
         raise RecordingError("fitted", "must hold at least one recording", 0, "give what was fitted")
     for other in recordings[1:]:
         _check_same_markers(recordings[0], other)
@@ -192,6 +193,8 @@ def baseline(
     Raises:
         RecordingError: the markers differ, nothing is left to score, or no baseline applies.
     """
+    check_kind("held_out", held_out, Recording, "give a piece of a recording", RecordingError)
+    check_kind("more", more or {}, Mapping, "give arrays (frames, markers, 3) by name", RecordingError)
     if isinstance(held_out, Cloud):
         return _still([fitted] if isinstance(fitted, Recording) else fitted, held_out)
     rest = rest_baseline(fitted)

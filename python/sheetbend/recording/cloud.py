@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,8 +11,10 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays.checks import check_count, finite, is_number
 from ..arrays.timeseries import Array
 from ..errors import RecordingError
+from ..files.names import checked_name
 from .io import cloud as file_of_cloud
 from .recording import Recording
 from .recording_checks import check_points, checked_positions, checked_times, padded
@@ -62,6 +65,8 @@ class Cloud(Recording):
         Raises:
             RecordingError: names the frame whose points are not finite or have another shape.
         """
+        if not isinstance(points, Sequence | np.ndarray):
+            raise RecordingError("points", "must be a list", points, "give the points (n, 3) m of each frame")
         at = checked_times(times, len(points))
         return cls(padded([_checked(k, frame) for k, frame in enumerate(points)]), at, **fields)
 
@@ -93,12 +98,13 @@ class Cloud(Recording):
 
     def frame(self, number: int) -> Array:
         """(n, 3) m, the points of one frame."""
+        check_count("frame", number, -len(self.times), len(self.times) - 1, RecordingError)
         return np.asarray(self.positions[number][self.mask[number]])
 
     def named(self, name: str) -> Cloud:
         """The same cloud under another name. Its frames keep their width, so that pieces of one cloud fit each
         other."""
-        return self._derive(name=name)
+        return self._derive(name=checked_name("name", name))
 
     def closest_among(self, points: Array) -> Array:
         """(frames, most, 3) m, of `points` (k, 3) the one closest to each of the cloud's; NaN behind a frame's own."""
@@ -124,8 +130,8 @@ class Cloud(Recording):
         Raises:
             RecordingError: `most` is not positive.
         """
-        if most < 1:
-            raise RecordingError("most", "must be positive", most, "give a number of points, such as 800")
+        check_count("most", most, 1, sys.maxsize, RecordingError)
+        check_count("seed", seed, 0, sys.maxsize, RecordingError)
         generator = np.random.default_rng(seed)
         frames = [self.frame(k) for k in range(len(self.times))]
         drawn = [np.sort(generator.permutation(len(x))[:most]) for x in frames]
@@ -145,10 +151,8 @@ class Cloud(Recording):
         Raises:
             RecordingError: the camera is no place, or the radius is not positive.
         """
-        at = np.asarray(camera, dtype=float)
-        if at.shape != (3,) or not np.isfinite(at).all():
-            raise RecordingError("camera", "must be a place", camera, "give x, y and z of the camera in m")
-        if not (np.isfinite(radius) and radius > 0):
+        at = finite("camera", camera, (3,), RecordingError)
+        if not (is_number(radius) and radius > 0):
             raise RecordingError("radius", "must be positive", radius, "give the rope's radius in m, such as 0.004")
         frames = [self.frame(k) for k in range(len(self.times))]
         away = [x - at for x in frames]

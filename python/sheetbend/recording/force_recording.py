@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays.checks import numbers
 from ..errors import RecordingError
 from ..files.door import check_room, reading
 from ..files.whole import written
@@ -89,10 +90,7 @@ class ForceRecording:
 
 
 def _samples(field: str, values: ArrayLike, shape: tuple[int, int]) -> Array:
-    try:
-        array = np.array(values, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise RecordingError(field, "must be real numbers", type(values).__name__, f"give {shape}") from error
+    array = numbers(field, values, RecordingError, copy=True)
     if array.shape != shape:
         raise RecordingError(field, "must have one row per sample", array.shape, f"give {shape}")
     if np.isinf(array).any():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import check_increasing, finite
+from ..arrays.checks import check_increasing, finite, numbers, vectors
 from ..arrays.rotations import matrices_of, quaternions_of, rotation_matrix, rotation_vectors
 from ..arrays.timeseries import Array
 from ..errors import RecordingError, SceneError
@@ -24,7 +24,7 @@ def markers_of_poses(positions: ArrayLike, quaternions: ArrayLike, points: Array
         RecordingError: shapes, or quaternions of no length.
     """
     x, q = _poses(positions, quaternions)
-    p = finite("points", points, (len(np.atleast_2d(np.asarray(points))), 3), RecordingError)
+    p = np.atleast_2d(vectors("points", points, RecordingError))
     return np.asarray(x[:, None] + np.einsum("fab,kb->fka", matrices_of(q), p))
 
 
@@ -76,7 +76,7 @@ def start_of_poses(
 
 
 def _poses(positions: ArrayLike, quaternions: ArrayLike) -> tuple[Array, Array]:
-    x, q = np.asarray(positions, dtype=float), np.asarray(quaternions, dtype=float)
+    x, q = numbers("positions", positions, RecordingError), numbers("quaternions", quaternions, RecordingError)
     if x.ndim != 2 or x.shape[1] != 3 or q.shape != (len(x), 4):
         fix = "give positions (frames, 3) and quaternions (frames, 4)"
         raise RecordingError("poses", "have the wrong shape", (x.shape, q.shape), fix)

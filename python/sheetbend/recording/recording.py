@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import timeseries
+from ..arrays.checks import MOST, is_bound, is_number, numbers
 from ..arrays.timeseries import Array, Kind
 from ..errors import RecordingError
 from . import io
 from .marker_data import MarkerData, read_only
 from .of_poses import markers_of_poses
-from .recording_checks import checked_times, choose_from, marker_indices
+from .recording_checks import checked_markers, checked_times, choose_from, marker_indices
 from .relabeled import relabeled
 
 _SAME_TIME = 1e-9  # s: decimal bounds such as 0.66 must find the frame stored as 0.6600000000000001
@@ -97,8 +98,8 @@ class Recording(MarkerData):
             RecordingError: shapes, quaternions of no length, or as for any recording.
         """
         x = markers_of_poses(positions, quaternions, points)
-        names = tuple(markers) or tuple(f"p{k}" for k in range(x.shape[1]))
-        return cls(x, np.asarray(times, dtype=float), markers=names, **fields)
+        names = checked_markers(markers, x.shape[1], "p")
+        return cls(x, checked_times(times, len(x)), markers=names, **fields)
 
     def save(self, path: str | Path) -> None:
         """Write the recording in meters; the suffix picks the writer. A JSON of the same stem holds the rest.
@@ -117,6 +118,9 @@ class Recording(MarkerData):
         Raises:
             RecordingError: no frame lies in the interval.
         """
+        for field, bound in (("start", start), ("stop", stop)):
+            if bound is not None and (not is_bound(bound)):
+                raise RecordingError(field, "must be a time", bound, "give s, or None")
         keep = np.ones(len(self.times), dtype=bool)
         if start is not None:
             keep &= self.times >= start - _SAME_TIME
@@ -158,9 +162,12 @@ class Recording(MarkerData):
         Raises:
             RecordingError: a span is no pair, holds no frame, or nothing is seen outside of them.
         """
+        if not isinstance(spans, Sequence | np.ndarray):
+            raise RecordingError("spans", "must be a list", spans, "give [(start, stop)] in s")
         inside = np.zeros(len(self.times), dtype=bool)
         for i, span in enumerate(spans):
-            if np.shape(span) != (2,) or not np.isfinite(np.asarray(span, dtype=float)).all():
+            ends = numbers(f"hidden[{i}]", span, RecordingError)
+            if ends.shape != (2,) or not np.isfinite(ends).all():
                 raise RecordingError(f"hidden[{i}]", "is no span", span, "give (start, stop) in s")
             own = (self.times >= span[0] - _SAME_TIME) & (self.times < span[1] - _SAME_TIME)
             if not own.any():
@@ -220,8 +227,8 @@ class Recording(MarkerData):
 
     def shifted(self, t0: float) -> Recording:
         """The same recording on a clock whose zero is the old time t0 (s): times - t0."""
-        if not np.isfinite(t0):
-            raise RecordingError("t0", "must be finite", float(t0), "give the time in s that becomes zero")
+        if not is_number(t0):
+            raise RecordingError("t0", "must be finite", t0, "give the time in s that becomes zero")
         return self._derive(times=checked_times(self.times - t0, len(self.times)))
 
     def filled(self, max_gap: float | None = None) -> Recording:
@@ -298,9 +305,9 @@ class Recording(MarkerData):
     def _max_gap(self, max_gap: float | None) -> float:
         if max_gap is None:
             return timeseries.default_max_gap(self.times)
-        if not max_gap >= 0:
+        if not isinstance(max_gap, int | float | np.number) or not max_gap >= 0:
             raise RecordingError("max_gap", "must be zero or positive", max_gap, "give the longest gap in s")
-        return float(max_gap)
+        return float(min(max_gap, MOST))
 
     def _refuse_open_gap(self, marker: int, frame: int, max_gap: float) -> None:
         seen = np.flatnonzero(self.mask[:, marker])

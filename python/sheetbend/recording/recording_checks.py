@@ -40,9 +40,9 @@ def marker_indices(what: str, chosen: Iterable[str | int], markers: tuple[str, .
     return tuple(indices)
 
 
-def default_markers(count: int) -> tuple[str, ...]:
+def default_markers(count: int, letter: str = "m") -> tuple[str, ...]:
     """The names of markers that the source does not name: m0, m1, ..."""
-    return tuple(f"m{i}" for i in range(count))
+    return tuple(f"{letter}{i}" for i in range(count))
 
 
 def _integer(what: str, item: Any) -> int:
@@ -65,7 +65,7 @@ def _numbers(what: str, values: ArrayLike, shape: str) -> Array:
     fix = f"give real numbers as an array of shape {shape}"
     try:
         array = np.asarray(values)
-    except ValueError:
+    except (TypeError, ValueError, RuntimeError):
         got = type(values).__name__
         raise RecordingError(what, "is ragged: its rows differ in length", got, fix) from None
     if array.dtype.kind not in "iuf":
@@ -152,10 +152,10 @@ def checked_times(values: ArrayLike, frames: int | None) -> Array:
     return t
 
 
-def checked_markers(names: Iterable[str], count: int) -> tuple[str, ...]:
+def checked_markers(names: Iterable[str], count: int, letter: str = "m") -> tuple[str, ...]:
     if isinstance(names, str) or not isinstance(names, Iterable):
         raise RecordingError("markers", "must be a list of names", names, f"give {count} names")
-    names = tuple(names) or default_markers(count)
+    names = tuple(names) or default_markers(count, letter)
     if len(names) != count:
         fix = f"give {count} names, one per marker of positions"
         raise RecordingError("markers", "must be one name per marker", len(names), fix)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays.checks import check_count, check_kind, numbers
 from ..errors import InputError, RecordingError
 from ..optional import require
 from ..quantities.wording import short
@@ -101,12 +103,12 @@ def coordinate_error(recording: Recording, predicted: ArrayLike, given: int = 1)
     Raises:
         RecordingError: the shape is wrong, nothing is left to score, or the prediction is not finite where it counts.
     """
-    predicted = np.asarray(predicted, dtype=np.float64)
+    check_kind("recording", recording, Recording, "read the file: sb.Recording.load(path)", RecordingError)
+    predicted = numbers("predicted", predicted, RecordingError)
     if predicted.shape != recording.positions.shape:
         fix = f"give one position per frame and marker, {recording.positions.shape}"
         raise RecordingError("predicted", f"does not fit {recording.name}", predicted.shape, fix)
-    if given < 0:
-        raise RecordingError("given", "must not be negative", given, "give a number of frames, such as 1")
+    check_count("given", given, 0, sys.maxsize, RecordingError)
     counts = recording.mask
     counts[:given] = False
     if not counts.any():
@@ -133,6 +135,9 @@ def scores(recordings: Sequence[Recording], predicted: Sequence[ArrayLike], give
         InputError: there is no recording, or not one prediction per recording.
         RecordingError: as for `coordinate_error`, or a clamped marker is lost (`Recording.filled`).
     """
+    for field, listed in (("recordings", recordings), ("predicted", predicted)):
+        if isinstance(listed, str) or not isinstance(listed, Sequence):
+            raise InputError(field, "must be a list", listed, "give one for each motion")
     if not recordings or len(recordings) != len(predicted):
         fix = f"give at least one recording and as many predictions ({len(recordings)} recordings)"
         raise InputError("predicted", "must hold one prediction per recording", len(predicted), fix)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import check_increasing, finite, per_item, triangle_array
+from ..arrays.checks import check_increasing, check_label, finite, per_item, triangle_array
 from ..errors import SceneError
 from ..quantities.quantities import ZERO_OR_MORE, Builder, Term
 
@@ -43,6 +43,7 @@ class Air:
         name: str,
     ) -> None:
         """See `Scene.add_air`."""
+        check_label("add_air.name", name)
         corners = triangle_array(f"{name}.air.triangles", triangles, scene.particle_count)
         given = {"normal": normal, "tangential": tangential}
         values = {kind: _coefficient(f"{name}.air.{kind}", k, len(corners)) for kind, k in given.items()}
@@ -54,6 +55,7 @@ class Air:
 
     def press(self, scene: Builder, triangles: ArrayLike, pressure: ArrayLike, name: str) -> None:
         """See `Scene.add_pressure`."""
+        check_label("add_pressure.name", name)
         corners = triangle_array(f"{name}.pressure.triangles", triangles, scene.particle_count)
         p = per_item(f"{name}.pressure", pressure, len(corners))
         if np.ndim(pressure) == 0:

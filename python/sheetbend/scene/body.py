@@ -11,12 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import finite
+from ..arrays import checks
+from ..arrays.checks import check_label, finite
 from ..arrays.rotations import quaternions_of
 from ..errors import SceneError
 from ..quantities.expression import cross, expressions, numbers, terms_of, vector
@@ -115,6 +116,7 @@ class Body:
         x = finite(where, at, (3,), SceneError)
         place = expressions(x)
         if name is not None:
+            check_label(f"{where}.name", name)
             names = [f"{name}_{a}" for a in AXES]
             for quantity, value in zip(names, x, strict=True):
                 self.scene.add_quantity(quantity, value, "m", positive=False, scale=PLACE)
@@ -188,15 +190,14 @@ class Body:
         Raises:
             SceneError: positions without the hidden nodes, which hold the axes.
         """
-        x = motion if not hasattr(motion, "nodes") else motion.nodes
-        p, turned = self._nodes(np.asarray(x, dtype=float))
+        p, turned = self._nodes(motion)
         at = self.values(values)
         frame = turned @ numbers(self.axes, at).T
         return p - frame @ numbers(self.center, at), frame
 
     def turned(self, way: ArrayLike) -> Array:
         """A direction (3,) of the body's frame in the world's axes (3,), at the initial positions of the scene."""
-        return np.asarray(self.pose(self.scene.nodes)[1] @ np.asarray(way, dtype=float))
+        return np.asarray(self.pose(self.scene.nodes)[1] @ finite(f"{self.name}.way", way, (3,), SceneError))
 
     def quaternions(self, motion: HasMotion | ArrayLike, values: Values = None) -> Array:
         """(..., 4), (x, y, z, w), from the body's axes to the world's. Of the two signs each frame of a motion has the
@@ -205,18 +206,18 @@ class Body:
 
     def angular_velocity(self, motion: HasMotion) -> Array:
         """Angular velocity (frames, 3) rad/s, in the world's axes."""
-        _, a = self._nodes(motion.nodes)
-        _, v = self._nodes(motion.node_velocities)
+        _, a = self._nodes(motion)
+        _, v = self._nodes(motion, "node_velocities")
         return np.asarray(0.5 * np.cross(a, v, axis=-2).sum(axis=-1))
 
     def momentum(self, motion: HasMotion, values: Values = None) -> Array:
         """Linear momentum (frames, 3) kg m/s."""
-        return np.asarray(self.inertia_of_nodes(values)[0] * self._nodes(motion.node_velocities)[0])
+        return np.asarray(self.inertia_of_nodes(values)[0] * self._nodes(motion, "node_velocities")[0])
 
     def angular_momentum(self, motion: HasMotion, values: Values = None, about: ArrayLike | None = None) -> Array:
         """Angular momentum (frames, 3) kg m^2/s, about the center of mass or about a fixed point (3,) m."""
-        x, a = self._nodes(motion.nodes)
-        v, rates = self._nodes(motion.node_velocities)
+        x, a = self._nodes(motion)
+        v, rates = self._nodes(motion, "node_velocities")
         mass, *J = self.inertia_of_nodes(values)
         spin = np.asarray((np.cross(a, rates, axis=-2) * J).sum(axis=-1))
         if about is None:
@@ -225,13 +226,13 @@ class Body:
 
     def kinetic_energy(self, motion: HasMotion, values: Values = None) -> Array:
         """Kinetic energy (frames,) J, of translation and rotation."""
-        v, rates = self._nodes(motion.node_velocities)
+        v, rates = self._nodes(motion, "node_velocities")
         mass, *J = self.inertia_of_nodes(values)
         return np.asarray(0.5 * (mass * (v**2).sum(axis=-1) + ((rates**2).sum(axis=-2) * J).sum(axis=-1)))
 
     def energy(self, motion: HasMotion, values: Values = None) -> Array:
         """Kinetic and potential energy (frames,) J; that of the weight is zero at the world's origin."""
-        x, _ = self._nodes(motion.nodes)
+        x, _ = self._nodes(motion)
         return self.kinetic_energy(motion, values) - self.inertia_of_nodes(values)[0] * (x @ self.scene.gravity)
 
     def inertia_of_nodes(self, values: Values = None) -> Array:
@@ -242,14 +243,18 @@ class Body:
 
     def values(self, changed: Values = None) -> dict[str, float]:
         """The scene's quantities by name, some of them changed."""
+        if not isinstance(changed, Mapping | None):
+            raise SceneError("values", "must be a mapping", changed, "give numbers by the names of quantities")
         return {name: q.value for name, q in self.scene.quantities.items()} | dict(changed or {})
 
-    def _nodes(self, x: Array) -> tuple[Array, Array]:
-        """The part of arrays (..., nodes, 3) that belongs to the center of mass, (..., 3), and to the axes, (..., 3, 3)
-        as columns."""
-        if x.ndim < 2 or x.shape[-2] != self.scene.node_count:
-            fix = f"give a trajectory, or the positions (..., {self.scene.node_count}, 3) of all its nodes"
-            raise SceneError(f"{self.name}.pose", "needs the nodes that hold its axes", x.shape, fix)
+    def _nodes(self, motion: HasMotion | ArrayLike, part: str = "nodes") -> tuple[Array, Array]:
+        """The part of a motion's arrays (..., nodes, 3) that belongs to the center of mass, (..., 3), and to the axes,
+        (..., 3, 3) as columns."""
+        fix = f"give a trajectory, or the positions (..., {self.scene.node_count}, 3) of all its nodes"
+        given: Any = getattr(motion, part, motion if part == "nodes" else None)
+        x = checks.numbers(f"{self.name}.motion", given, SceneError)
+        if x.ndim < 2 or x.shape[-2:] != (self.scene.node_count, 3):
+            raise SceneError(f"{self.name}.motion", "needs the nodes that hold its axes", x.shape, fix)
         own = x[..., self.particles, :]
         return own[..., 0, :], np.swapaxes(own[..., 1:, :], -1, -2)
 

@@ -193,13 +193,15 @@ class CompiledScene:
             SceneError: an unknown name, no finite number, or one outside the range of its quantity.
         """
         theta = self.theta.copy()
+        if not isinstance(changes, Mapping | None):
+            raise SceneError("values", "must be a mapping", changes, "give numbers by the names of quantities")
         for name, value in (changes or {}).items():
             if name not in self.names:
                 raise SceneError("values", "name no quantity of the scene", name, choices(name, self.names))
             k = self.names.index(name)
             try:
                 theta[k] = value
-            except (TypeError, ValueError):
+            except (TypeError, ValueError, OverflowError, RuntimeError):
                 theta[k] = np.nan
         self.domain.check_quantities(theta[None])
         return theta

@@ -9,7 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import is_number, node_array
+from ..arrays.checks import check_label, is_number, node_array
 from ..errors import SceneError
 from ..quantities.expression import terms_of
 from ..quantities.quantities import ZERO_OR_MORE, Builder, Term
@@ -168,7 +168,8 @@ class Contacts:
                 collider,
                 "give a Plane, Sphere, Capsule, Cylinder, Box or DistanceField",
             )
-        name = name or collider.name or collider.shape
+        name = collider.name or collider.shape if name is None else name
+        check_label("contact.name", name)
         if any(c.name == name for c in self.contacts):
             raise SceneError("contact.name", "is taken by another contact", name, "give each contact a name of its own")
         if isinstance(what, BodyPoints):

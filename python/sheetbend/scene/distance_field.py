@@ -122,9 +122,11 @@ def _sampled(label: str, mesh: TriangleMesh, spacing: float | None, margin: floa
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     step = float((high - low).max() / CELLS if spacing is None else spacing)
     around = MARGIN * step if margin is None else margin
-    counts = np.ceil((high - low + 2.0 * around) / step).astype(int) + 1
+    counts = np.ceil((high - low + 2.0 * around) / step) + 1.0
     if counts.prod() > MOST_POINTS:
-        raise SceneError(f"{label}.spacing", f"needs {counts.prod():.3g} grid points", step, "give a larger one")
+        fix = "give a larger spacing, or a smaller margin"
+        raise SceneError(f"{label}.spacing", f"needs {counts.prod():.3g} grid points", step, fix)
+    counts = counts.astype(int)
     origin = 0.5 * (low + high) - 0.5 * step * (counts - 1)
     axes = [start + step * np.arange(n) for start, n in zip(origin, counts, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)

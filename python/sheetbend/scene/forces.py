@@ -19,11 +19,11 @@ def spread_over(forces: ArrayLike, shape: tuple[int, ...]) -> Array:
     Raises:
         SceneError: they have another shape, or are not finite.
     """
+    given = finite("add_force.forces", forces, None, SceneError)
     try:
-        every = np.broadcast_to(np.asarray(forces), shape)
+        return np.broadcast_to(given, shape)
     except ValueError as error:
-        raise SceneError("add_force.forces", "has the wrong shape", np.shape(forces), f"give {shape}") from error
-    return finite("add_force.forces", every, shape, SceneError)
+        raise SceneError("add_force.forces", "has the wrong shape", given.shape, f"give {shape}") from error
 
 
 class Forces:

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays.checks import finite
+from ..errors import SceneError
 from .moving_clamp import clamped_ends, keep_direction, let_go
 from .nodes import SceneNodes
 
@@ -28,7 +30,7 @@ class HeldScene(SceneNodes):
         """
         self._building()
         which, ends = self._with_clamps("drive", particles)
-        x = np.asarray(positions)
+        x = finite("drive.positions", positions, None, SceneError)
         if ends and x.ndim == 3 and x.shape[1] == len(which):
             x = np.concatenate([x, x[:, [slot for slot, _ in ends]]], axis=1)
             which = [*which, *(ghost for _, ghost in ends)]

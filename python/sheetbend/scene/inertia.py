@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import finite, is_number
+from ..arrays.checks import check_kind, finite, is_number
 from ..arrays.rotations import rotation_matrix
 from ..errors import SceneError
 from ..mesh.topology import half_edges
@@ -38,8 +38,7 @@ class Inertia:
     matrix: Array
 
     def __init__(self, mass: float, matrix: ArrayLike, center: ArrayLike = (0.0, 0.0, 0.0)) -> None:
-        if not (is_number(mass) and mass > 0):
-            raise SceneError("inertia.mass", "must be positive", mass, "give kg")
+        _check_mass(mass)
         m = finite("inertia", matrix, None, SceneError)
         m = np.diag(m) if m.shape == (3,) else m
         if m.shape != (3, 3) or abs(m - m.T).max() > SLACK * abs(m).max():
@@ -57,18 +56,21 @@ class Inertia:
     @classmethod
     def box(cls, mass: float, sides: ArrayLike) -> Inertia:
         """A homogeneous box of sides (3,) m about its middle."""
+        _check_mass(mass)
         a = _lengths("inertia.sides", sides, 3)
         return cls(mass, mass / 12.0 * ((a**2).sum() - a**2))
 
     @classmethod
     def ball(cls, mass: float, radius: float) -> Inertia:
         """A homogeneous ball about its middle."""
+        _check_mass(mass)
         (r,) = _lengths("inertia.radius", [radius], 1)
         return cls(mass, np.full(3, 0.4 * mass * r**2))
 
     @classmethod
     def cylinder(cls, mass: float, radius: float, length: float) -> Inertia:
         """A homogeneous cylinder along x about its middle."""
+        _check_mass(mass)
         r, h = _lengths("inertia.radius, length", [radius, length], 2)
         across = mass * (3.0 * r**2 + h**2) / 12.0
         return cls(mass, [0.5 * mass * r**2, across, across])
@@ -82,6 +84,7 @@ class Inertia:
         Raises:
             SceneError: the mesh is open or inside out, or the density is not positive.
         """
+        check_kind("inertia.mesh", mesh, TriangleMesh, "give a closed mesh, such as sb.read_mesh(path)", SceneError)
         if not (is_number(density) and density > 0):
             raise SceneError("inertia.density", "must be positive", density, "give kg/m^3")
         check_closed("inertia.mesh", mesh.triangles)
@@ -106,8 +109,8 @@ class Inertia:
         Raises:
             SceneError: no part, or what is no Inertia.
         """
-        if not parts or not all(isinstance(p, Inertia) for p in parts):
-            raise SceneError("inertia.parts", "are no bodies", list(parts), "give one or more sb.Inertia")
+        if not isinstance(parts, Sequence) or not parts or not all(isinstance(p, Inertia) for p in parts):
+            raise SceneError("inertia.parts", "are no bodies", parts, "give a list of one or more sb.Inertia")
         mass = sum(p.mass for p in parts)
         center = np.sum([p.mass * p.center for p in parts], axis=0) / mass
         return cls(mass, np.sum([p.about(center) for p in parts], axis=0), center)
@@ -131,6 +134,11 @@ class Inertia:
             return np.diag(self.matrix).copy(), np.eye(3)
         moments, axes = np.linalg.eigh(self.matrix)
         return moments, axes * np.array([1.0, 1.0, np.sign(np.linalg.det(axes))])
+
+
+def _check_mass(mass: object) -> None:
+    if not (is_number(mass) and mass > 0):  # type: ignore[operator]
+        raise SceneError("inertia.mass", "must be positive", mass, "give kg")
 
 
 def _lengths(field: str, values: ArrayLike, count: int) -> Array:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import node_array, per_item
+from ..arrays.checks import check_label, node_array, per_item
 from ..errors import SceneError
 from ..mesh.triangle_mesh import TriangleMesh
 from ..quantities.kinds import KINDS
@@ -184,9 +184,10 @@ class Scene(SelfTouchingScene):
                 can move.
         """
         self._building()
-        if kind not in KINDS:
+        if not isinstance(kind, str) or kind not in KINDS:
             raise SceneError("kind", "is no known constraint", kind, f"use one of: {', '.join(KINDS)}")
-        name = name or kind
+        name = kind if name is None else name
+        check_label("add_constraints.name", name)
         if any(g.name == name for g in self.groups):
             raise SceneError("name", "is taken by another group", name, "give each group a name of its own")
         group = make_group(
@@ -212,6 +213,7 @@ class Scene(SelfTouchingScene):
 
     def add_point_mass(self, particle: int, mass: float, name: str) -> None:
         """Hang a mass [kg] on a particle as the quantity `<name>_mass`."""
+        check_label("add_point_mass.name", name)
         (index,) = node_array("add_point_mass.particle", [particle], self.particle_count).tolist()
         self.add_quantity(f"{name}_mass", mass, "kg")
         self.add_terms([product("mass", index, 1.0, {f"{name}_mass": "identity"})])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import finite, node_array
+from ..arrays.checks import check_label, finite, node_array
 from ..arrays.column import Column
 from ..errors import SceneError
 from ..quantities.kinds import KINDS
@@ -48,6 +48,7 @@ class SceneData:
     """The content of a `Scene`, which adds to it and simulates it. SI units, z up."""
 
     def __init__(self, name: str = "scene", gravity: ArrayLike = (0.0, 0.0, -9.81)) -> None:
+        check_label("scene.name", name)
         self.name = name
         self.quantities: dict[str, Quantity] = {}
         self.terms: list[Term] = []
@@ -90,7 +91,7 @@ class SceneData:
             SceneError: the name is taken, or the value is not finite (or not positive where it must be).
         """
         self._building()
-        quantity = Quantity(name, float(value), unit, positive, scale, limits, beyond)
+        quantity = Quantity(name, value, unit, positive, scale, limits, beyond)
         before = self.quantities.setdefault(name, quantity)
         if before is quantity or (shared and before == quantity):
             return name
@@ -217,7 +218,7 @@ class SceneData:
         """
         constraint = row = 0
         for g in self.groups:
-            if g.name == name:
+            if isinstance(name, str) and g.name == name:
                 return g, constraint, row
             constraint += len(g.particles)
             row += len(g.particles) * KINDS[g.kind]["rows"]

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays.checks import check_kind
 from ..errors import SceneError
 from ..files.whole import written
 from .compiled import specification
@@ -74,6 +75,7 @@ def load_scene(path: str | Path) -> Scene:
 
 
 def _header(scene: Scene) -> dict[str, Any]:
+    check_kind("scene", scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
     scene.freeze()
     named: dict[str, Any] = {
         "name": scene.name,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.checks import is_number
+from ..arrays.checks import check_label, is_number
 from ..errors import SceneError
 from ..moved import OldMethod
 from .body import BodyCapsules
@@ -58,8 +58,9 @@ class SelfTouchingScene(HeldScene):
             raise SceneError("self_contact.friction", "must not be negative", friction, "give a coefficient, or 0")
         if pairs is not None and not (is_number(pairs) and pairs == int(pairs) and pairs > 0):
             raise SceneError("self_contact.pairs", "must be a positive number", pairs, "give one, or leave it out")
-        given = np.atleast_1d(np.asarray(radius, dtype=object)).ravel().tolist()
-        radii: list[float] = given * len(own) if np.ndim(radius) == 0 else given
+        check_label("self_contact.name", name)
+        given: list[Any] = list(radius) if isinstance(radius, Sequence | np.ndarray) else [radius] * len(own)
+        radii: list[float] = given
         if len(radii) != len(own) or not all(is_number(r) and r > 0 for r in radii):
             fix = f"give m, one for all or {len(own)}, one for each piece"
             raise SceneError("self_contact.radius", "must be positive", radius, fix)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import is_number, triangle_array
+from ..arrays.checks import check_label, is_number, triangle_array
 from ..errors import SceneError
 from ..quantities.quantities import Builder, Term
 from .inertia import check_closed
@@ -25,6 +25,7 @@ class Volumes:
 
     def add(self, scene: Builder, triangles: ArrayLike, compliance: float, rest: float | None, name: str) -> None:
         """See `Scene.add_volume`."""
+        check_label("add_volume.name", name)
         field = f"{name}.volume"
         if name in self.triangles:
             raise SceneError(field, "is there already", name, "give each volume a name of its own")

@@ -24,7 +24,7 @@ from .units import unit
 LARGEST = 2**25
 """Bytes of a file."""
 _DELIMITERS = (";", "\t", ",", None)  # None: blanks
-_NUMBER = {mark: re.compile(rf"[-+]?(\d+{mark}?\d*|{mark}\d+)([eE][-+]?\d+)?") for mark in (r"\.", ",")}
+_NUMBER = {mark: re.compile(rf"[-+]?(\d+({mark}\d*)?|{mark}\d+)([eE][-+]?\d+)?") for mark in (r"\.", ",")}
 _GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}([.,'\u2019 \u00a0\u202f])\d{3}(?:\1\d{3})*(?:([.,])\d+)?")
 _MISSING = ("nan", "inf", "na", "n/a", "null", "none")
 MOST_LINES = 500_000

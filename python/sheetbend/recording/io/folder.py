@@ -48,6 +48,8 @@ def read_recordings(
             name, or a file is refused (which is named): all of them where `refused` is given.
     """
     root = Path(folder)
+    if not isinstance(pattern, str) or not pattern or Path(pattern).is_absolute():
+        raise RecordingError("pattern", "is no pattern of names", pattern, "give such as '*.csv'")
     known = [suffix for suffix in FORMATS if suffix != NOTES or pattern.lower().endswith(NOTES)]
     files, others = _files(root, pattern, known)
     errors = {file.name: _of_another_kind(file) for file in others}

@@ -1,0 +1,113 @@
+"""Arguments of a wrong kind: each public function refuses them by an error that names the argument, or takes them."""
+
+from __future__ import annotations
+
+import inspect
+import math
+import signal
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from wrong_calls import CALLS
+
+LONGEST = 20.0  # s of the processor, for one call
+
+
+class Strange:
+    """What no function knows, and what NumPy cannot convert, as a tensor that has a gradient."""
+
+    def __array__(self, *_: object, **__: object) -> np.ndarray:
+        raise RuntimeError("Can't call numpy() on Tensor that requires grad.")
+
+
+WRONG: dict[str, Any] = {
+    "None": None,
+    "text": "x",
+    "empty text": "",
+    "NaN": math.nan,
+    "negative": -1,
+    "400 digits": 10**400,
+    "a thousand million": 10**9,
+    "truth value": True,
+    "complex": 1j,
+    "texts": ["a", "b", "c"],
+    "empty list": [],
+    "empty mapping": {},
+    "ragged": [[1], [1, 2]],
+    "object": Strange(),
+    "path": Path("/does/not/exist"),
+    "NaNs": np.full((3, 3), math.nan),
+    "four axes": np.zeros((2, 2, 2, 2)),
+}
+NO_NUMBERS = ("text", "NaN", "complex", "texts", "ragged", "object", "path", "NaNs")  # and no lengths, masses, ...
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Texts are paths of files that are written."""
+    monkeypatch.chdir(tmp_path)
+    before = signal.signal(signal.SIGPROF, _too_long)
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        yield
+    signal.signal(signal.SIGPROF, before)
+
+
+def _too_long(*_: object) -> None:
+    raise TimeoutError(f"a call took more than {LONGEST:g} s")
+
+
+def complaint(name: str, argument: str, label: str) -> str:
+    """What is wrong with what a call does to a wrong argument; empty if nothing is."""
+    call, given = CALLS[name]()
+    usual, wrong = given[argument], WRONG[label]
+    signal.setitimer(signal.ITIMER_PROF, LONGEST)
+    try:
+        call(**{**given, argument: wrong})
+    except sb.SheetbendError as error:
+        return "" if len(str(error)) < 2000 else f"tells {len(str(error))} characters"
+    except (TypeError, ValueError) as error:
+        told = str(error).lower()
+        named = (
+            argument in told
+            or "pathlike" in told
+            or ("truth value of an array" in told and isinstance(wrong, np.ndarray))
+        )
+        return "" if named else f"{type(error).__name__}: {error}"
+    except Exception as error:
+        return f"{type(error).__name__}: {error}"
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+    return "is taken for a number" if isinstance(usual, float) and label in NO_NUMBERS else ""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CALLS)
+def test_wrong_arguments_are_refused_by_name(name: str) -> None:
+    call, given = CALLS[name]()
+    call(**given)  # right as it stands
+    found = {(a, label): told for a in given for label in WRONG if (told := complaint(name, a, label))}
+    assert not found
+
+
+def test_every_public_function_is_called() -> None:
+    """A new public name gets a call in `wrong_calls.py`, or a reason here to have none."""
+    without = {
+        *("Arm", "Body", "Cloth", "ContactCounts", "ContactMode", "Equilibrium", "Fit", "FitResult", "ForceBalance"),
+        *("Gradient", "GradientReport", "Joint", "Place", "Plan", "Rod", "Rollout", "Rope", "Score", "Scores", "Solid"),
+        *("TapePlan", "Trajectory"),  # results, which functions make
+        *("Grip", "Cloud", "SolidMesh", "TriangleMesh"),  # by class methods, and with `mesh.`
+        *("Junction", "fit_rope"),  # no arguments; many recordings
+    }
+    called = {name.split(" ")[0].split(".")[0] for name in CALLS}
+    public = {n for n in sb.__all__ if callable(getattr(sb, n)) and not _is_error(getattr(sb, n))}
+    assert public - called - without == set()
+
+
+def _is_error(found: object) -> bool:
+    return inspect.isclass(found) and issubclass(found, Exception)
