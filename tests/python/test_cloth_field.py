@@ -82,6 +82,18 @@ def test_the_jacobian_is_that_of_differences() -> None:
         assert (after - before) / 2e-5 == pytest.approx(J[:, k], abs=1e-4 * np.abs(J[:, k]).max())
 
 
+def test_the_gradient_with_respect_to_modes_is_that_of_the_jacobian() -> None:
+    e, q = seen(3, np.array([0.3, -0.2, 0.1])), np.array([0.2, 0.1, -0.1])
+    modes = field_of(e.scene).modes
+    problem = FitProblem([e], as_parameters([*modes], [e]))
+    _, r, J = problem.evaluate(q)
+    rollout = sb.rollout(e.scene, TIMES, SOLVER, values=dict(zip(modes, q, strict=True)))
+    bar = np.zeros_like(rollout.positions)
+    bar[:, [SEEN[k] for k in e.compared]] = r.reshape(len(TIMES), -1, 3) / NOISE
+    gradient = rollout.gradient(bar).quantities
+    assert [gradient[mode] for mode in modes] == pytest.approx(J.T @ r, rel=1e-9)
+
+
 def test_intervals_of_triangles_count_the_modes_that_are_not_fitted() -> None:
     whole = field_of(hung(48))
     q = whole.deviations(0.3, 0.1) * np.random.default_rng(2).standard_normal(48)
