@@ -82,6 +82,38 @@ def test_friction_of_the_first_and_of_the_last_third_agree_or_are_doubted(single
         assert meet or "doubtful" in (one.verdict, other.verdict), (str(one), str(other))
 
 
+@pytest.fixture(scope="module")
+def pushed(tmp_path_factory: pytest.TempPathFactory) -> tuple[sb.Fit, sb.Fit]:
+    """Fits with pushes to the first and to the last third."""
+    folder = EXPERIMENTS / "pendulum_pushed"
+    text = (folder / "pendulum_pushed.toml").read_text()
+    edits = {"[0.0, 12.0]": "[24.665, 36.665]", "arm_angle = 1.6, arm_rate = -2.1": "arm_angle = 0.0, arm_rate = 6.2"}
+    fits = []
+    for changes in ({}, edits):
+        changed = text
+        for before, after in changes.items():
+            assert changed.count(before) == 1, before
+            changed = changed.replace(before, after)
+        path = tmp_path_factory.mktemp("pushed") / "pushed.toml"
+        path.write_text(changed)
+        fits.append(fitted(build(parse(path), folder)))
+    return fits[0], fits[1]
+
+
+def test_with_pushes_friction_and_drag_of_both_thirds_agree(pushed: tuple[sb.Fit, sb.Fit], single: sb.Fit) -> None:
+    """Each lies within 5 % for friction and in intervals that meet; the plain fit names pushes as a cause."""
+    first, last = pushed
+    assert last["arm_friction"].value == pytest.approx(first["arm_friction"].value, rel=0.05)
+    for name in ("arm_friction", "arm_drag"):
+        one, other = first[name], last[name]
+        assert max(one.lower, other.lower) < min(one.upper, other.upper), (str(one), str(other))
+        assert "such as small pushes along the motion, which `shooting` counts" in single[name].words
+        assert "pushes" not in one.words + other.words
+    for fit in pushed:
+        (found,) = fit.result.shot
+        assert 5e-5 < found.loss < 2e-4, found  # m/s
+
+
 def test_slow_errors_within_sigma_do_not_contradict_the_first_third_of_a_second(single: sb.Fit) -> None:
     """Friction and drag of the first 0.333 s alone differ by 57 and 47 %. What is left of that stretch tells of 25 %;
     slow errors like those of the rest, below sigma, move 35 and 44 %."""

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays.timeseries import Array, mean_position
+from ..experiment.cut import start_quantities
 from ..experiment.experiment import Experiment
 from ..minimum.discretization import Refinement
 from ..minimum.lifted import WithStates
@@ -118,19 +119,19 @@ def _between(
     found = contradiction(r, J, every, layout=layout, within=within, shifts=known, taken=taken, errors=errors)
     if found is None:
         return {}
-    words = {}
+    words, lack = {}, _lack(problem)
     for d in found.differences:
         name, column = names[used[d.column]], used[d.column]
         reach = reach_of(problem.parameters[name], estimates[name]) + SECOND_ORDER * d.shift
         if abs(d.steps[0] - d.steps[1]) > d.reach + SECOND_ORDER * d.shift and abs(d.steps[0]) > reach:
-            words[name] = _difference_words(problem.parameters[name], u[column], d)
+            words[name] = _difference_words(problem.parameters[name], u[column], d, lack)
     for without in left_out(r, J, found.split, layout, within, known, taken, errors):
         name, column = names[used[without.column]], used[without.column]
         p = problem.parameters[name]
         reach = max(reach_of(p, estimates[name]), without.reach)
         by_mesh = SECOND_ORDER * without.shift
         if name not in words and abs(without.step) > reach + by_mesh:
-            words[name] = _without_words(p, u[column], without)
+            words[name] = _without_words(p, u[column], without, lack)
         elif name not in words and found.split.apart and without.surely > reach_of(p, estimates[name]) + by_mesh:
             words[name] = _scatter_words(p, u[column], without)
     return drawn_along(judged, words)
@@ -170,20 +171,25 @@ def residual_shifts(problem: FitProblem, u: Array, refinement: Refinement) -> li
     return shifts
 
 
-def _difference_words(p: Parameter, at: float, found: Difference) -> str:
+def _lack(problem: FitProblem) -> str:
+    """What contradicting parts mean; where states at borders of windows could be freed, pushes are named, which move a
+    real motion off its model a little at every instant."""
+    windows = any(not e.static and e.shooting is None and start_quantities(e.scene) for e in problem.experiments)
+    such = ", such as small pushes along the motion, which `shooting` counts" if windows else ""
+    return f"the model lacks something{such}, or this is not its lowest minimum"
+
+
+def _difference_words(p: Parameter, at: float, found: Difference, lack: str) -> str:
     said = [value_words(p, at, step, reach) for step, reach in zip(found.steps, found.reaches, strict=True)]
     return (
         f"parts of the data contradict each other: {found.name} asks for {said[0]}, the rest for {said[1]} (to first "
-        "order); the model lacks something, or this is not its lowest minimum"
+        f"order); {lack}"
     )
 
 
-def _without_words(p: Parameter, at: float, found: LeftOut) -> str:
+def _without_words(p: Parameter, at: float, found: LeftOut, lack: str) -> str:
     value = value_words(p, at, found.step, found.reach)
-    return (
-        f"parts of the data contradict each other: without {found.name} it would be {value} (to first order); the "
-        "model lacks something, or this is not its lowest minimum"
-    )
+    return f"parts of the data contradict each other: without {found.name} it would be {value} (to first order); {lack}"
 
 
 def _scatter_words(p: Parameter, at: float, found: LeftOut) -> str:
