@@ -33,7 +33,7 @@ void let_slide_vjp(const Scene& scene, const Inputs<const T>& in, const T* state
     p_bar[K::yield_parameter] -= along;
     for (int j = 0; j < K::rows; ++j)
       e_bar[j] = at.f * set_bar(j) + at.y_over_length * at.inverse_length * along * at.e[j];
-    leave_shape<K>(e_bar);
+    leave_sliding<K>(e_bar);
 
     // de/dset = -1; with a share e = C - (1 - share) set, where C holds -share set: by the share 0
     T by_x[K::dofs]{}, by_p[parameter_count<K>]{};

@@ -37,6 +37,7 @@
 #include "core/constraints/yielding_curvature.h"
 #include "core/constraints/yielding_sheet_curvature.h"
 #include "core/constraints/yielding_solid_strain.h"
+#include "core/constraints/yielding_strain.h"
 
 namespace sheetbend {
 
@@ -81,7 +82,8 @@ using Registry = std::tuple<   //
     TetrahedronVolume,         //
     BrickNeoHookean,           //
     TetrahedronNeoHookean,     //
-    YieldingBrickStrain>;
+    YieldingBrickStrain,       //
+    YieldingStrain>;
 
 inline constexpr int kind_count = std::tuple_size_v<Registry>;
 

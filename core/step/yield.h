@@ -3,7 +3,7 @@
 //   set' = set + f e,   f = max(0, 1 - y/|e|)        (return mapping of a circular yield surface: Simo & Hughes 1998, sec. 3.3)
 //
 // e = C - (1 - share) set for a kind with a spring beside it (yielding_curvature.h), of which the deviator where shape alone yields
-// (yielding_solid_strain.h); otherwise C of the kind's Slider (friction_hinge.h);
+// (yielding_solid_strain.h), or some rows (yielding_strain.h); otherwise C of the kind's Slider (friction_hinge.h);
 // evaluated at the state that the substep has found. The branch is taken by the values alone, so the reverse repeats it.
 #pragma once
 
@@ -31,13 +31,16 @@ using Slider = typename SliderOf<K>::type;
 template <class K>
 inline constexpr bool shares_load = requires { K::share_parameter; };
 
-// Leaves the deviator of a strain whose first three rows are the normal ones, where the kind yields in shape alone.
+// Leaves what of a strain can slide: the deviator, where the kind yields in shape alone and the first three rows are the normal ones, or the rows from
+// first_sliding on. A projection that is its own transpose.
 template <class K, class T>
-void leave_shape(T* e) {
+void leave_sliding(T* e) {
   if constexpr (requires { K::yields_in_shape; }) {
     const T mean = T(1.0 / 3.0) * (e[0] + e[1] + e[2]);
     for (int j = 0; j < 3; ++j) e[j] = e[j] - mean;
   }
+  if constexpr (requires { K::first_sliding; })
+    for (int j = 0; j < K::first_sliding; ++j) e[j] = T(0.0);
 }
 
 template <class K, class T>
@@ -60,7 +63,7 @@ struct SlidingSpring {
       e[j] = C[j];
       if constexpr (shares_load<K>) e[j] = C[j] - (one - K::share(p)) * x[set + j];
     }
-    leave_shape<K>(e);
+    leave_sliding<K>(e);
     T length2(0.0);
     for (int j = 0; j < K::rows; ++j) length2 += e[j] * e[j];
     slides = length2 > y * y;
@@ -131,7 +134,7 @@ void let_slide(const Scene& scene, const Inputs<const Dual<double, N>>& in, Dual
       }
       if constexpr (shares_load<K>) e[j] -= (Directed(1.0) - K::share(p)) * at(set + j);
     }
-    leave_shape<K>(e);
+    leave_sliding<K>(e);
     Directed length2;
     for (int j = 0; j < K::rows; ++j) length2 += e[j] * e[j];
     // in the order of SlidingSpring, so that the values have its bits

@@ -40,10 +40,15 @@ TEST_P(Tangents, FollowTheRollout) {
     const double error = relative_error(part(found, k), expected);
     worst = std::max(worst, error);
     if (error <= 1e-12) continue;
-    // No worse than what the last bits of the inputs do to the oracle itself: both programs round, each on its own.
-    std::vector<double> near = sample.inputs;
-    for (double& a : near) a *= 1.0 + random(-1.0, 1.0) * std::numeric_limits<double>::epsilon();
-    EXPECT_LE(error, 2.0 * relative_error(oracle(near), expected));
+    // No worse than what the last bits of the inputs do to the oracle itself: both programs round, each on its own. One change of these bits may
+    // by chance do a tenth of what another does.
+    double rounding = 0.0;
+    for (int draw = 0; draw < 4; ++draw) {
+      std::vector<double> near = sample.inputs;
+      for (double& a : near) a *= 1.0 + random(-1.0, 1.0) * std::numeric_limits<double>::epsilon();
+      rounding = std::max(rounding, relative_error(oracle(near), expected));
+    }
+    EXPECT_LE(error, 2.0 * rounding);
   }
   record_error("tangents", worst);
 }

@@ -86,6 +86,23 @@ def test_a_loop_of_shear(tmp_path):
     assert "lose 40 %" in (tmp_path / "out/report.txt").read_text(encoding="utf-8")
 
 
+def test_a_loop_of_shear_tells_a_cloth_that_yields(tmp_path):
+    """G = 50 N/m, of which 0.3 slides beyond a shear strain of 2 %, under KES-FB1's tension."""
+    angle = np.radians(np.concatenate([np.linspace(0, 8, 101), np.linspace(8, -8, 201)[1:], np.linspace(-8, 0, 101)]))
+    slid, rows = 0.0, []
+    for s in np.tan(angle):
+        slid = min(max(slid, s - 0.02), s + 0.02)
+        rows.append(f"{math.degrees(math.atan(s)):.8f}\t{50.0 * (s - 0.3 * slid) + 9.80665 * s:.9f}")
+    (tmp_path / "loop.txt").write_text("\n".join(rows) + "\n")
+    told = ["--column", "deformation=1", "--column", "load=2", "--unit", "deformation=deg", "--unit", "load=N/m"]
+    options = ["--test", "shear", *told, "--figures", "none", "--output", str(tmp_path / "out"), "--json"]
+    done = run(str(tmp_path / "loop.txt"), *options)
+    assert done.exit_code == 0, done.stderr
+    (loop,) = json.loads(done.stdout)["curves"]
+    assert [loop[key] for key in ("shear", "yield_shear_share", "yield_shear")] == approx([50.0, 0.3, 0.02], rel=1e-4)
+    assert "yield_shear_share" in (tmp_path / "out/report.txt").read_text(encoding="utf-8")
+
+
 def test_a_loop_of_bending_tells_a_cloth_that_yields(tmp_path):
     """B = 20 uN m, of which 0.3 slides beyond 0.4 1/cm; and a specimen without a way back."""
     curvature = np.concatenate(

@@ -281,6 +281,52 @@ def test_the_yield_of_a_bending_loop():
     )
     assert [found.bending.value, found.yield_share.value] == approx([B, share], rel=0.03)
     assert found.misfit == approx(2e-5 / (2.0 * share * B * kappa), rel=0.1)
+    assert [e.name for e in found.estimates] == ["bending", "yield_share", "yield_curvature"]
+    assert all(e.verdict == "identified" and e.half_width < 0.05 * e.value for e in found.estimates)
+
+
+def sheared(G: float, share: float, at: float, tension: float, *stops: float) -> Curve:
+    """The forces of a spring beside one that slides, along a path of shear angles, under a tension that is kept."""
+    angle, slid, load = path(*stops), 0.0, []
+    for s in np.tan(angle):
+        slid = min(max(slid, s - at), s + at)
+        load.append(G * (s - share * slid) + tension * s)
+    return Curve("loop", "shear", angle, np.array(load))
+
+
+KES = (0.0, math.radians(8), math.radians(-8), 0.0)
+
+
+def test_the_yield_of_a_shear_loop():
+    G, share, at, tension = 56.0, 0.3, 0.02, 1e3 * GF
+    curve = sheared(G, share, at, tension, *KES)
+    found = textile.shear_yield(curve)
+    values = [found.shear.value, found.yield_shear_share.value, found.yield_shear.value, found.hysteresis.value]
+    assert values == approx([G, share, at, 2.0 * share * G * at], rel=1e-6)
+    assert found.misfit < 1e-6 and found.shear.laboratory == approx(G * math.radians(0.01 / GF), rel=1e-6)
+    read = textile.shear_loop(curve)
+    assert read.hysteresis_far is not None
+    assert read.hysteresis_far.value == approx(found.hysteresis.value, rel=1e-3)  # at 5 degrees, where both ways slide
+    whole = textile.shear_yield(curve, tension=0.0)
+    assert whole.shear.value == approx(G + tension, rel=1e-6)
+    assert whole.hysteresis.value == approx(found.hysteresis.value, rel=1e-6)
+    assert [e.name for e in found.estimates] == ["shear", "yield_shear_share", "yield_shear"]
+    with pytest.raises(sb.InputError, match="is no test of shear"):
+        textile.shear_yield(sliding(2e-5, 0.3, 40.0, 0.0, 0.0, 250.0, -250.0))
+
+
+@pytest.mark.parametrize("together", [0.0, 0.8], ids=["white", "alike"])
+def test_intervals_of_a_yield_hold_it(together):
+    """Of 20 draws of noise of 6 % of the loop's height, also where neighboring points have nearly the same error."""
+    true, held = (56.0, 0.3, 0.02), np.zeros(3)
+    curve = sheared(*true, 1e3 * GF, *KES)
+    for seed in range(20):
+        error = 0.05 * np.random.default_rng(seed).standard_normal(len(curve.load))
+        for k in range(1, len(error)):
+            error[k] = together * error[k - 1] + math.sqrt(1.0 - together**2) * error[k]
+        found = textile.shear_yield(replace(curve, load=curve.load + error))
+        held += [e.lower <= value <= e.upper for e, value in zip(found.estimates, true, strict=True)]
+    assert (held >= 17).all()
 
 
 def test_what_shows_no_yield_is_refused():

@@ -14,7 +14,17 @@ from ..errors import InputError
 from ..files.whole import written
 from ..quantities.wording import short
 from ..report.tables import Section, plain_section
-from ..textile import Curve, FabricFit, MeanCurve, Reading, bending_loop, bending_yield, shear_loop, tensile_loop
+from ..textile import (
+    Curve,
+    FabricFit,
+    MeanCurve,
+    Reading,
+    bending_loop,
+    bending_yield,
+    shear_loop,
+    shear_yield,
+    tensile_loop,
+)
 
 _COLUMNS = {
     "tension": "strain (mm/mm),force (N/m),scatter (N/m)",
@@ -32,19 +42,20 @@ def kes_numbers(curve: Curve, cycle: int) -> tuple[dict[str, Reading | None], fl
         return {"EMT": t.extension, "WT": t.energy, "LT": t.linearity, "RT": t.resilience}, lost
     if curve.test == "shear":
         s = shear_loop(curve, cycle)
-        return {"G": s.stiffness, "2HG": s.hysteresis, "2HG5": s.hysteresis_far}, s.lost
+        return {"G": s.stiffness, "2HG": s.hysteresis, "2HG5": s.hysteresis_far, **_yields(curve)}, s.lost
     b = bending_loop(curve, cycle)
     return {"B": b.rigidity, "2HB": b.hysteresis, **_yields(curve)}, b.lost
 
 
 def _yields(curve: Curve) -> dict[str, Reading | None]:
     """What a cloth with the same loop takes, by its keys, and what that leaves of the loop's height."""
+    sheared = curve.test == "shear"
+    keys = ("shear", "yield_shear_share", "yield_shear") if sheared else ("bending", "yield_share", "yield_curvature")
     try:
-        y = bending_yield(curve)
+        found = shear_yield(curve) if sheared else bending_yield(curve)
     except InputError:  # too little of a loop to tell
-        return dict.fromkeys(("bending", "yield_share", "yield_curvature", "misfit"))
-    misfit = Reading(y.misfit, "", {}, "%", 100.0)
-    return {"bending": y.bending, "yield_share": y.yield_share, "yield_curvature": y.yield_curvature, "misfit": misfit}
+        return dict.fromkeys((*keys, "misfit"))
+    return {key: getattr(found, key) for key in keys} | {"misfit": Reading(found.misfit, "", {}, "%", 100.0)}
 
 
 def report(curves: Sequence[Curve], fit: FabricFit | None, cycle: int) -> str:

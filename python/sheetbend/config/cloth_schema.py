@@ -212,6 +212,13 @@ class Cloth(Section):
         gt=0,
     )
     yield_share: Finite | None = key(None, "the part of `bending` that slides", gt=0, lt=1)
+    yield_shear: Finite | None = key(
+        None,
+        "elastic shear strain (tangent of the angle in simple shear) beyond which yarns slide where they cross, of the "
+        "linear law; elastic when left out",
+        gt=0,
+    )
+    yield_shear_share: Finite | None = key(None, "the part of `shear` that slides", gt=0, lt=1)
     drag_linear: Finite | None = key(None, "linear air drag per area", "N s/m^3", gt=0)
     drag_quadratic: Finite | None = key(None, "quadratic air drag per area", "N s^2/m^4", gt=0)
     warp_size: Finite | None = key(
@@ -321,6 +328,7 @@ class Cloth(Section):
 FABRIC = (
     *("density", "warp", "weft", "shear", "poisson", "law", "bending", "bending_weft", "bending_twist"),
     *("bending_model", "membrane_damping", "bend_damping", "yield_curvature", "yield_share"),
+    *("yield_shear", "yield_shear_share"),
     *("drag_linear", "drag_quadratic"),
 )
 """Keys of a cloth that tell its fabric."""

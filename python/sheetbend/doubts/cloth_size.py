@@ -83,11 +83,19 @@ def _larger(scene: Scene, cloth: Cloth, values: Mapping[str, float], axis: int) 
             ends = [_alone(cloth, 1.0 + side * STEP, axis, still) for side in (-1.0, 1.0)]
         except SceneError:
             continue
-        groups = ends[0].groups
         known = {g.name: g.particles for g in scene.groups}
-        if all(np.array_equal(known.get(g.name, ()), cloth.particles[g.particles]) for g in groups):
+        if all(_are_same(known.get(g.name), g.particles, cloth) for g in ends[0].groups):
             return list(_differences(scene, cloth, ends, values))
     return []
+
+
+def _are_same(known: Array | None, alone: Array, cloth: Cloth) -> bool:
+    """Whether stencils in the scene are those of the cloth alone. What yields has a hidden node at the end of its
+    stencil, which each scene numbers by itself, below zero."""
+    if known is None or known.shape != alone.shape:
+        return False
+    vertices = alone >= 0
+    return np.array_equal(known[vertices], cloth.particles[alone[vertices]])
 
 
 def _alone(cloth: Cloth, size: float, axis: int, still: tuple[int, ...]) -> Scene:
@@ -112,7 +120,7 @@ def _differences(scene: Scene, cloth: Cloth, ends: list[Scene], values: Mapping[
         if not by.any():
             continue
         if array in PARTICLES:
-            yield array, cloth.particles.astype(int), by
+            yield array, cloth.particles.astype(int), by[: len(cloth.particles)]
             continue
         entries = np.zeros(size, dtype=int)
         for g in ends[0].groups:

@@ -15,12 +15,12 @@ from ..errors import SceneError
 from ..mesh import TriangleMesh
 from ..quantities.quantities import Term
 from ..scene.scene import Array, Scene
-from .cloth_cut import Bending, Cut
-from .elastic_group import add_elastic_group
+from .cloth_cut import Bending, Cut, Stretching
 from .flat_size import FlatSize
 from .hinges import Hinges
 from .laws import Law, Linear
 from .sheet_bending import SheetCurvature
+from .sheet_stretching import add_membrane
 from .stiffness_field import StiffnessField, field_of_triangles
 from .yielding import check_yield
 
@@ -110,6 +110,8 @@ def add_cloth(
     bend_damping: float | None = None,
     yield_curvature: float | None = None,
     yield_share: float | None = None,
+    yield_shear: float | None = None,
+    yield_shear_share: float | None = None,
     drag_linear: float | None = None,
     drag_quadratic: float | None = None,
     warp_size: float | None = None,
@@ -121,7 +123,8 @@ def add_cloth(
     Quantities: `<fabric>_density` kg/m^2, `_warp`, `_weft`, `_shear` N/m, `_poisson`, the law's coefficients (see
     `sheetbend.laws`) such as `_warp_stiffening`, and where given `_bending`, `_bending_weft`,
     `_bending_twist` N m, `_membrane_damping` s,
-    `_bend_damping` s, `_yield_curvature` 1/m, `_yield_share`, `_drag_linear` N s/m^3, `_drag_quadratic` N s^2/m^4;
+    `_bend_damping` s, `_yield_curvature` 1/m, `_yield_share`, `_yield_shear`, `_yield_shear_share`,
+    `_drag_linear` N s/m^3, `_drag_quadratic` N s^2/m^4;
     and of this cut alone, where given, `<name>_warp_size`, `<name>_weft_size` and `<name>_stiffness_1` and so on.
 
     The membrane's energy per area is Y_warp f(E_uu)^2 + 2 n sqrt(Y_warp Y_weft) f(E_uu) f(E_vv) + Y_weft f(E_vv)^2,
@@ -154,6 +157,10 @@ def add_cloth(
         yield_share: the part of the bending stiffness that slides, between 0 and 1: beyond yield (1 - share) of it is
             left. Small motion shows all of it. A strip bent back and forth has a loop of 2 share bending
             yield_curvature in its moment per width (2HB of a KES test).
+        yield_shear: the elastic shear strain 2 E_uv, in simple shear the tangent of the angle, beyond which yarns slide
+            on each other where they cross. What has slid starts at zero. None = elastic. Of the linear law.
+        yield_shear_share: the part of the shear stiffness that slides, between 0 and 1. A strip sheared back and forth
+            has a loop of 2 yield_shear_share shear yield_shear in its force per width (2HG of a KES test).
         drag_linear, drag_quadratic: air drag per area, N s/m^3 and N s^2/m^4, isotropic.
         warp_size, weft_size: size of the flat cloth along warp and weft over that of the mesh, between 0.8 and 1.25:
             what it would be without tension, its area and its mass follow, and the numbers of the fabric stay. The
@@ -180,14 +187,16 @@ def add_cloth(
         "membrane_damping": membrane_damping,
         "bend_damping": bend_damping,
         "yield_curvature": yield_curvature,
+        "yield_shear": yield_shear,
         "drag_linear": drag_linear,
         "drag_quadratic": drag_quadratic,
     }
     check_positive(name, needed, optional)
     fabric = fabric or name
     check_yield(name, yield_curvature, yield_share, "the bending stiffness")
-    named = {"poisson": poisson, "law": law or Linear(), "bending_model": bending_model, "yield_share": yield_share}
-    numbers = needed | optional | named
+    check_yield(name, yield_shear, yield_shear_share, "the shear stiffness", ("yield_shear", "yield_shear_share"))
+    named = {"poisson": poisson, "law": law or Linear(), "bending_model": bending_model}
+    numbers = needed | optional | named | {"yield_share": yield_share, "yield_shear_share": yield_shear_share}
     _check_cut(scene, name, fabric, numbers)
     _check_together(name, numbers)
     shape = (
@@ -206,7 +215,9 @@ def add_cloth(
     check_count(f"{name}.stiffness_modes", stiffness_modes, 0, len(mesh.triangles))
     if stiffness_modes:
         varying = field_of_triangles(scene, mesh, name, f"{fabric}_warp", stiffness_modes, kept)
-    _membrane(cut, kept, (warp, weft, shear, poisson), law or Linear(), membrane_damping, varying)
+    slides = None if yield_shear is None or yield_shear_share is None else (yield_shear, yield_shear_share)
+    stretches = Stretching(warp, weft, shear, poisson, law or Linear(), membrane_damping, slides)
+    add_membrane(cut, kept, stretches, varying)
     if bending is not None:
         yields = None if yield_curvature is None or yield_share is None else (yield_curvature, yield_share)
         bends = Bending(bending, bending_model, bending_weft, bending_twist, curved, bend_damping, yields)
@@ -242,6 +253,9 @@ def _check_together(name: str, numbers: Mapping[str, Any]) -> None:
         if numbers[field] is not None and (bending is None or model != "curvature"):
             fix = "give bending and keep bending_model = 'curvature', or leave it out"
             raise SceneError(f"{name}.{field}", "belongs to the curvature model", numbers[field], fix)
+    if numbers["yield_shear"] is not None and not isinstance(numbers["law"], Linear):
+        fix = "give the linear law, or leave it out"
+        raise SceneError(f"{name}.yield_shear", "belongs to the linear law", numbers["yield_shear"], fix)
 
 
 def _weigh(cut: Cut, density: float, linear: float | None, quadratic: float | None) -> None:
@@ -256,60 +270,3 @@ def _weigh(cut: Cut, density: float, linear: float | None, quadratic: float | No
             scene.has_drag = True
             quantity = scene.add_quantity(f"{fabric}_drag_{kind}", value, unit, shared=True)
             scene.add_terms([Term(f"drag_{kind}", cut.particles, share, ((quantity, "identity"), *area))])
-
-
-def _membrane(
-    cut: Cut,
-    kept: Array,
-    stiffness: tuple[float, float | None, float, float],
-    law: Law,
-    damping: float | None,
-    field: StiffnessField | None,
-) -> None:
-    """Tension and shear of the triangles that can move.
-
-    Args:
-        kept: (count,) those triangles.
-        stiffness: warp, weft and shear, N/m, and Poisson's number; weft = warp where it is None.
-        law: how tension grows with strain.
-        damping: Kelvin-Voigt time constant, s.
-        field: how the stiffness varies from triangle to triangle.
-    """
-    scene, mesh, name, fabric, size = cut.scene, cut.mesh, cut.name, cut.fabric, cut.size
-    warp, weft, shear, poisson = stiffness
-    corners, areas = mesh.corners[kept], mesh.areas[kept]
-    count = len(kept)
-    coefficients = list(law.coefficients())
-    rest = np.zeros((count, 7 + len(coefficients)))
-    rest[:, :4] = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)).reshape(count, 4)
-    if weft is None:
-        rest[:, 5] = 1.0
-    values = add_elastic_group(
-        scene,
-        law.kind,
-        cut.particles[mesh.triangles[kept]],
-        name=f"{name}_membrane",
-        rest=rest,
-        scale=areas,
-        stiffness=(f"{fabric}_warp", warp, "N/m"),
-        damping=(f"{fabric}_membrane_damping", damping),
-        size=size,
-        varies=() if field is None else tuple(zip(field.modes, field.shapes.T, strict=True)),
-    )
-    size.strains(scene, f"{name}_membrane", values)
-    terms = []
-    over_warp = (f"{fabric}_warp", "inverse_sqrt")
-    for place, label, value in ((5, "weft", weft), (6, "shear", shear)):
-        if value is not None:
-            scene.add_quantity(f"{fabric}_{label}", value, "N/m", shared=True)
-            terms.append(Term("rest", values + place, 1.0, ((f"{fabric}_{label}", "sqrt"), over_warp)))
-    scene.add_quantity(f"{fabric}_poisson", poisson, "", positive=False, scale=0.1, limits=(-1.0, 1.0), shared=True)
-    terms.append(Term("rest", values + 4, 1.0, ((f"{fabric}_poisson", "identity"),)))
-    own = scene.groups[-1].rest
-    for place, (label, value, fittable) in enumerate(coefficients, start=7):
-        if fittable:
-            scene.add_quantity(f"{fabric}_{label}", value, "", shared=True)
-            terms.append(Term("rest", values + place, 1.0, ((f"{fabric}_{label}", "identity"),)))
-        else:
-            own[:, place] = value
-    scene.add_terms(terms)

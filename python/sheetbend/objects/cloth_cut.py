@@ -8,6 +8,7 @@ from typing import NamedTuple
 from ..mesh import TriangleMesh
 from ..scene.scene import Array, Scene
 from .flat_size import FlatSize
+from .laws import Law
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,26 @@ class Cut:
     fabric: str
     particles: Array
     size: FlatSize
+
+
+class Stretching(NamedTuple):
+    """How a cloth stretches and shears in its plane, as `add_cloth` was given it.
+
+    Attributes:
+        warp, weft, shear: stiffness, N/m; weft = warp where it is None.
+        poisson: sqrt(nu_uv nu_vu).
+        law: how tension grows with strain.
+        damping: Kelvin-Voigt time constant, s; None = undamped.
+        slides: the shear strain at which it yields, and the share of the shear stiffness that slides; None = elastic.
+    """
+
+    warp: float
+    weft: float | None
+    shear: float
+    poisson: float
+    law: Law
+    damping: float | None
+    slides: tuple[float, float] | None
 
 
 class Bending(NamedTuple):

@@ -1,5 +1,5 @@
-"""What is said of yield: of a rod and a cloth a curvature and a share, which belong together; of a solid a stress and
-its hardening."""
+"""What is said of yield: of a rod and a cloth a curvature (of a cloth also a shear) and a share, which belong together;
+of a solid a stress and its hardening."""
 
 from __future__ import annotations
 
@@ -11,20 +11,29 @@ from ..errors import SceneError
 from ..mesh import SolidMesh
 
 
-def check_yield(name: str, curvature: float | None, share: float | None, stiffness: str) -> None:
+def check_yield(
+    name: str,
+    at: float | None,
+    share: float | None,
+    stiffness: str,
+    fields: tuple[str, str] = ("yield_curvature", "yield_share"),
+) -> None:
     """Refuse one of them without the other, and a share that is none.
 
     Args:
+        at: the deformation at which it yields.
         stiffness: the argument that they are a part of.
+        fields: the arguments that gave `at` and `share`.
 
     Raises:
-        SceneError: names `<name>.yield_share`.
+        SceneError: names the argument of the share.
     """
-    if (curvature is None) != (share is None):
-        fix = "give yield_curvature and yield_share, or neither"
-        raise SceneError(f"{name}.yield_share", "and yield_curvature belong together", share, fix)
+    where = f"{name}.{fields[1]}"
+    if (at is None) != (share is None):
+        fix = f"give {fields[0]} and {fields[1]}, or neither"
+        raise SceneError(where, f"and {fields[0]} belong together", share, fix)
     if share is not None and not (is_number(share) and 0 < share < 1):
-        raise SceneError(f"{name}.yield_share", "must lie between 0 and 1", share, f"give a part of {stiffness}")
+        raise SceneError(where, "must lie between 0 and 1", share, f"give a part of {stiffness}")
 
 
 def check_plastic(

@@ -13,7 +13,7 @@ def kinks(scene: SceneData) -> str:
     """
     found = []
     if any("yielding" in group.kind for group in scene.groups):
-        found.append("what yields (yield_curvature, yield_stress)")
+        found.append("what yields (yield_curvature, yield_shear, yield_stress)")
     if any(group.kind in ("friction_hinge", "joint_friction") for group in scene.groups):
         found.append("joints with dry friction")
     if any(group.kind in ("angle_stop", "slide_stop") for group in scene.groups):

@@ -20,6 +20,7 @@ from .picture_frame import PictureFrame, picture_frame
 from .pull import fit_pull, pulled, strains_under
 from .reading import GRAM_FORCE, Reading
 from .shear import Shear, shear
+from .shear_yield import ShearYield, shear_yield
 from .uniaxial import Uniaxial, uniaxial
 from .whole_fabric import FabricTests, WholeFabric, fit_tests
 
@@ -43,6 +44,7 @@ __all__ = [
     "Reading",
     "Shear",
     "ShearLoop",
+    "ShearYield",
     "TensileLoop",
     "Uniaxial",
     "WholeFabric",
@@ -64,6 +66,7 @@ __all__ = [
     "read_outline",
     "shear",
     "shear_loop",
+    "shear_yield",
     "strains_under",
     "tensile_loop",
     "uniaxial",

@@ -5,18 +5,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from ..arrays.timeseries import Array
-from ..errors import InputError
+from ..result.estimate import Estimate
 from .curve import Curve
 from .kes import check_test
 from .reading import GRAM_FORCE, Reading
-
-_TRIALS = 60  # yield curvatures of a round; each round looks closer about the best of the last
-_ROUNDS = 6
-_LEAST = 1e-3  # of the range of curvatures
-_MOST_LEFT = 0.5  # of the height of a loop: beyond it there is none to see
+from .sliding import fit_sliding
 
 
 @dataclass(frozen=True)
@@ -29,6 +22,7 @@ class BendingYield:
         yield_curvature: how far fibers bend before they slide.
         offset: the moment at zero curvature before anything slid: of a rest curvature, or the instrument's zero.
         misfit: root mean square of what the law leaves of the moments, over the height of the loop, 2HB.
+        estimates: bending, yield_share and yield_curvature with their 95 % intervals.
     """
 
     bending: Reading
@@ -36,6 +30,7 @@ class BendingYield:
     yield_curvature: Reading
     offset: Reading
     misfit: float
+    estimates: tuple[Estimate, ...]
 
 
 def bending_yield(curve: Curve) -> BendingYield:
@@ -51,47 +46,16 @@ def bending_yield(curve: Curve) -> BendingYield:
 
     Raises:
         InputError: no test of bending, one that never turns back, or one without the loop of a spring that slides.
+        MissingExtraError: scipy is not installed.
     """
     check_test(curve, "bending")
-    if len(curve.branches()) < 2:
-        raise InputError(curve.name, "never turns back", "one way", "give a test that goes there and back")
-    widest = 0.5 * float(np.ptp(curve.deformation))  # beyond it nothing slides on the way back
-    trials = 2.0 * widest * np.geomspace(_LEAST, 0.5, _TRIALS)
-    for _ in range(_ROUNDS):
-        solved = [_linear(curve, own) for own in _sets(curve.deformation, trials)]
-        best = int(np.argmin([squares for _, squares in solved]))
-        (bending, slides, offset), squares = solved[best]
-        yield_curvature = float(trials[best])
-        trials = np.linspace(trials[max(best - 1, 0)], trials[min(best + 1, _TRIALS - 1)], _TRIALS)
-    height, left = 2.0 * slides * yield_curvature, float(np.sqrt(squares / len(curve.load)))
-    if not (0.0 < slides < bending and yield_curvature < widest and left < _MOST_LEFT * height):
-        wrong = f"a height of {height:.3g} N, of which {left:.3g} N rms are left"
-        fix = "give a test that bends on in both directions after its slope has fallen, or leave out the yield"
-        raise InputError(curve.name, "has no loop of a spring that slides", wrong, fix)
+    names, units = ("bending", "yield_share", "yield_curvature"), ("N", "N m", "1/m")
+    found = fit_sliding(curve, curve.deformation, names, units)
     return BendingYield(
-        Reading(bending, "N m", {}, "gf cm^2/cm", 100.0 / GRAM_FORCE),
-        Reading(slides / bending, "", {}, "", 1.0),
-        Reading(yield_curvature, "1/m", {}, "1/cm", 0.01),
-        Reading(offset, "N", {}, "gf cm/cm", 1.0 / GRAM_FORCE),
-        left / height,
+        Reading(found.stiffness.value, "N m", {}, "gf cm^2/cm", 100.0 / GRAM_FORCE),
+        Reading(found.share.value, "", {}, "", 1.0),
+        Reading(found.distance.value, "1/m", {}, "1/cm", 0.01),
+        Reading(found.offset, "N", {}, "gf cm/cm", 1.0 / GRAM_FORCE),
+        found.misfit,
+        found.estimates,
     )
-
-
-def _sets(curvature: Array, yields: Array) -> Array:
-    """(yields, points) what has slid along a path, for each yield curvature; exact between turns."""
-    found = np.zeros((len(curvature), len(yields)))
-    slid = np.zeros(len(yields))
-    for k, kappa in enumerate(curvature):
-        slid = np.clip(slid, kappa - yields, kappa + yields)
-        found[k] = slid
-    return found.T
-
-
-def _linear(curve: Curve, slid: Array) -> tuple[tuple[float, float, float], float]:
-    """B, share B and the offset that fit the moments best, and the sum of squares that they leave."""
-    columns = np.column_stack([curve.deformation, -slid, np.ones(len(slid))])
-    scale = np.maximum(np.abs(columns).max(axis=0), np.finfo(float).tiny)
-    found, *_ = np.linalg.lstsq(columns / scale, curve.load)
-    left = curve.load - columns / scale @ found
-    bending, slides, offset = (float(v) for v in found / scale)
-    return (bending, slides, offset), float(left @ left)

@@ -222,6 +222,18 @@ inline Case case_of<Strain>() {
           .parameter_relabeling = {2, 3, 0, 1, 4, 5, 6}};
 }
 
+// Sliding: the shear from the set is about three times the yield strain.
+template <>
+inline Case case_of<YieldingStrain>() {
+  Case row = case_of<Strain>();
+  row.x.insert(row.x.end(), {0.0, 0.0, 0.05});
+  row.p.insert(row.p.end(), {0.4, 0.03});
+  row.relabeling.push_back(3);
+  row.parameter_sign.resize(row.p.size(), 1);
+  row.parameter_relabeling.insert(row.parameter_relabeling.end(), {7, 8});
+  return row;
+}
+
 template <>
 inline Case case_of<ExponentialStrain>() {
   return {.x = triangle_sample,

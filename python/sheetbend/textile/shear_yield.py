@@ -1,0 +1,72 @@
+"""From a loop of shear to the yield of a cloth (`sb.add_cloth`): its whole shear stiffness, the share of it that
+slides, and the shear strain beyond which it does."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..result.estimate import Estimate
+from .curve import Curve
+from .kes import check_test
+from .reading import GRAM_FORCE, Reading
+from .sliding import fit_sliding
+
+_PER_DEGREE = math.radians(0.01 / GRAM_FORCE)  # gf/(cm deg) per N/m
+
+
+@dataclass(frozen=True)
+class ShearYield:
+    """Result of `shear_yield`.
+
+    Attributes:
+        shear: G of small motion, as `add_cloth` takes it: the slope after a turn without the tension's part. KES reads
+            (1 - yield_shear_share) G and that part.
+        yield_shear_share: the part of G that slides.
+        yield_shear: the shear strain, tangent of the angle, before yarns slide.
+        hysteresis: height of the loop, 2 yield_shear_share shear yield_shear: 2HG where both ways slide.
+        offset: the force at zero angle before anything slid.
+        misfit: root mean square of what the law leaves of the forces, over the height of the loop.
+        estimates: shear, yield_shear_share and yield_shear with their 95 % intervals.
+    """
+
+    shear: Reading
+    yield_shear_share: Reading
+    yield_shear: Reading
+    hysteresis: Reading
+    offset: Reading
+    misfit: float
+    estimates: tuple[Estimate, ...]
+
+
+def shear_yield(curve: Curve, *, tension: float = 1e3 * GRAM_FORCE) -> ShearYield:
+    """Fit a spring beside one that slides to all points of a curve in their order, by least squares.
+
+    F = G (s - share set) + tension s + offset with the shear strain s, the tangent of the angle, where the set, zero at
+    first, follows s at the distance `yield_shear`. After a turn the slope is G + tension, and (1 - share) G + tension
+    from twice the yield on. The hysteresis of a KES test differs between 2HG at 0.5 and 2HG5 at 5 degrees where yarns
+    lock or begin to slide one after another, which `misfit` shows.
+
+    Args:
+        curve: of shear, from the unsheared specimen on, with at least one turn.
+        tension: across the jaws, N/m, kept over the test; that of KES-FB1, 10 gf/cm. 0 where there is none.
+
+    Raises:
+        InputError: no test of shear, one that never turns back, or one without the loop of a spring that slides.
+        MissingExtraError: scipy is not installed.
+    """
+    check_test(curve, "shear")
+    names, units = ("shear", "yield_shear_share", "yield_shear"), ("N/m", "N/m", "")
+    found = fit_sliding(curve, np.tan(curve.deformation), names, units, tension)
+    height = 2.0 * found.share.value * found.stiffness.value * found.distance.value
+    return ShearYield(
+        Reading(found.stiffness.value, "N/m", {}, "gf/(cm deg)", _PER_DEGREE),
+        Reading(found.share.value, "", {}, "", 1.0),
+        Reading(found.distance.value, "", {}, "%", 100.0),
+        Reading(height, "N/m", {}, "gf/cm", 0.01 / GRAM_FORCE),
+        Reading(found.offset, "N/m", {}, "gf/cm", 0.01 / GRAM_FORCE),
+        found.misfit,
+        found.estimates,
+    )
