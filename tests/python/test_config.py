@@ -371,8 +371,19 @@ BAD = [
     ("substeps = 4", "integrator = 'rk4'", "solver.integrator", "'bdf1' or 'bdf2'"),
     ("substeps = 4", "memory = '2 XB'", "solver.memory", "units are B, kB, MB"),
     ("substeps = 4", "memory = 0", "solver.memory", "give bytes"),
-    ("gravity = [0, 0, -9.81]", "gravity = [0, -9.81]", "scene.gravity", "at least 3"),
-    ("gravity = [0, 0, -9.81]", "gravity = 9.81", "scene.gravity", "a list"),
+    ("gravity = [0, 0, -9.81]", "gravity = [0, -9.81]", "scene.gravity", "must be 3 numbers"),
+    ("gravity = [0, 0, -9.81]", "gravity = 9.81", "scene.gravity", "[0, 0, -9.81] if z points up"),
+    ("gravity = [0, 0, -9.81]", "gravity = -1.62", "scene.gravity", "[0, 0, -1.62] if z points up"),
+    ("substeps = 4", "h = 480", "solver.h", "give 0.002083 for 480 substeps in a second"),
+    ("substeps = 4", "h = 1e-12", "solver.h", "substeps of"),
+    ("substeps = 4", 'h = "1/480"', "solver.h", "write 0.00208333"),
+    ("substeps = 4", "dt = 1e-3", "solver.dt", "did you mean 'h'?"),
+    ("EI = 2e-3", "E = 2e6", "scene.rope[0].E", "EI = E * I"),
+    ("density = 0.05", "mass = 0.03", "scene.rope[0].mass", "the mass over the length"),
+    ("[[scene.rope]]", "[[rope]]", "rope", "[[scene.rope]]"),
+    ("pinned = [0]", "pinned = 0", "scene.rope[0].pinned", "write pinned = [0]"),
+    ("pinned = [0]", "clamp_start = true", "scene.rope[0].clamp_start", "write clamp_start = [x, y, z]"),
+    ('name = "swing"\n', 'name = "my swing"\n', "experiment.name", 'write "my_swing"'),
     ("gravity = [0, 0, -9.81]", "gravty = [0, 0, 1]", "scene.gravty", "did you mean 'gravity'"),
     ("gravity = [0, 0, -9.81]", 'pin = ["wire:0"]', "scene.pin", "use one of: rope"),
     ("gravity = [0, 0, -9.81]", 'pin = ["rope"]', "scene.pin", "write such as 'rope:0'"),
@@ -492,7 +503,7 @@ BAD = [
     ("sigma = 1e-4", "axes = 'xw'", "recording[0].axes", "x, y, z"),
     ("sigma = 1e-4", "axes = 'xx'", "recording[0].axes", "'xz'"),
     ("sigma = 1e-4", "loss = 'cauchy'", "recording[0].loss", "'huber'"),
-    ("sigma = 1e-4", "units = 'ft'", "recording[0].units", "'mm'"),
+    ("sigma = 1e-4", "units = 'inch'", "recording[0].units", "'mm'"),
     ("sigma = 1e-4", "ropes = ['wire']", "recording[0].ropes", "name some of: rope"),
     ("sigma = 1e-4", "start_time = 0.1", "recording[0].start_time", "start earlier"),
     ("sigma = 1e-4", "frames = [40, 50]", "recording[0].frames", "31 frames"),
@@ -546,7 +557,10 @@ BAD = [
     ("lower = 1e-5", "minimum = 0.1", "parameters.rope_EI.minimum", "lower"),
     ("lower = 1e-5", "initial = -1.0", "parameters.rope_EI", "positive"),
     ("lower = 1e-5\nupper = 1.0", "tied_to = 'x'", "parameters.rope_EI.tied_to", "name one of"),
-    ("lower = 1e-5", "prior = [1.0]", "parameters.rope_EI.prior", "at least 2"),
+    ("lower = 1e-5", "prior = [1.0]", "parameters.rope_EI.prior", "write prior = [mean, sd]"),
+    ("[parameters.rope_EI]", "[parameters.rope.EI]", "parameters.rope.EI", "write [parameters.rope_EI]"),
+    ("fit = [0.0, 0.2]", "fit = 0.2", "recording[0].fit", "write fit = [start, stop]"),
+    ("sigma", "noise", "recording[0].noise", "did you mean 'sigma'?"),
     ("[published]", "[fit]\noptimizer = 'adam'\n[published]", "fit.optimizer", "'scipy'"),
     ("[published]", "[fit]\nthreads = 0\n[published]", "fit.threads", "at least 1"),
     ("[published]", "[output]\nfigures = 'gif'\n[published]", "output.figures", "'png'"),
@@ -582,6 +596,11 @@ def test_two_recordings_of_one_name(folder: Path) -> None:
 def test_broken_toml_names_the_line(folder: Path) -> None:
     with pytest.raises(sb.ConfigError, match="line 2"):
         load(written(folder, '[experiment]\nname = "swing\n'))
+
+
+def test_a_path_with_backslashes_says_how_to_write_it(folder: Path) -> None:
+    with pytest.raises(sb.ConfigError, match="write / in place of"):
+        load(changed(folder, 'file = "swing.npz"', r'file = "data\swing.npz"'))
 
 
 def test_a_scene_starts_before_its_recording_where_start_time_says_so(folder: Path) -> None:

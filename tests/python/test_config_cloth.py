@@ -236,7 +236,7 @@ def test_a_wind_that_starts_from_zero_has_an_equilibrium(folder: Path) -> None:
         ("velocity = [[1, 2, 3], [4, 5, 6]]", "scene.wind", "give the time of each"),
         ("velocity = [1, 2, 3]\ntimes = [0, 1]", "scene.wind", "not one velocity at each of its 2 times"),
         ("velocity = [[1, 2, 3], [4, 5, 6]]\ntimes = [1, 0]", "scene.wind.times", "must increase"),
-        ("speed = 3.0", "scene.wind.velocity", "add velocity to [scene.wind]"),
+        ("speed = 3.0", "scene.wind.speed", "did you mean 'velocity'?"),
     ],
 )
 def test_winds_that_are_refused(folder: Path, wind: str, field: str, fix: str) -> None:

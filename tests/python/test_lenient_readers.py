@@ -30,6 +30,7 @@ def rows(extra: int = 0) -> list[list[float]]:
         ("t,1x,1y,1z,2x,2y,2z", ("m1", "m2"), 1.0),
         ("time,M1_X (mm),M1_Y (mm),M1_Z (mm),M2_X (mm),M2_Y (mm),M2_Z (mm)", ("M1", "M2"), 1e-3),
         ("time,a_x_cm,a_y_cm,a_z_cm,b_x_cm,b_y_cm,b_z_cm", ("a", "b"), 1e-2),
+        ("time,a_x [in],a_y [in],a_z [in],b_x [in],b_y [in],b_z [in]", ("a", "b"), 0.0254),
         ("Temps [s],X_a,Y_a,Z_a,X_b,Y_b,Z_b", ("a", "b"), 1.0),
     ],
 )

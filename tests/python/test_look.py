@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from dataclasses import replace
@@ -336,6 +337,32 @@ def test_units_and_the_axis_that_points_up(tmp_path: Path) -> None:
     assert any("mm" in line for line in said["seen"]) and any(
         line.startswith("y is taken as up") for line in said["seen"]
     )
+
+
+def test_inches_are_named_among_the_units_that_may_be_right(tmp_path: Path) -> None:
+    """A rope of 28 inches was taken for one of 28 cm without a word about other units."""
+    take = takes.let_go(False, 0.3)
+    sb.Recording(take.positions / 0.0254, take.times, take.markers).save(tmp_path / "take.csv")
+    said = json.loads(run("new", tmp_path / "take.csv", "-o", tmp_path / "a.toml", "--json").stdout)
+    (words,) = (line for line in said["seen"] if line.startswith("lengths are taken as cm"))
+    true = np.linalg.norm(np.ptp(take.positions, axis=(0, 1)))
+    assert f"in in {true:.3g} m" in words and words.endswith("begin again with --units")
+    again = run("new", tmp_path / "take.csv", "-o", tmp_path / "b.toml", "--units", "in", "--json").stdout
+    assert "lengths are taken as in" in json.loads(again)["seen"]
+    (rope,) = tomllib.loads((tmp_path / "b.toml").read_text())["scene"]["rope"]
+    assert rope["length"] == approx(takes.LENGTH, rel=5e-3)
+
+
+def test_a_table_without_a_unit_is_said_to_be_in_m(tmp_path: Path) -> None:
+    take = takes.let_go(False, 0.3)
+    take.save(tmp_path / "take.csv")
+    take.save(tmp_path / "archive.npz")
+    for beside in tmp_path.glob("*.json"):
+        beside.unlink()
+    said = json.loads(run("new", tmp_path / "take.csv", "-o", tmp_path / "a.toml", "--json").stdout)
+    assert any(line.startswith("lengths are taken as m, because the file does not say") for line in said["seen"])
+    said = json.loads(run("new", tmp_path / "archive.npz", "-o", tmp_path / "b.toml", "--json").stdout)
+    assert not any(line.startswith("lengths are") for line in said["seen"])
 
 
 def test_a_rope_of_700_m_is_refused_with_its_unit(tmp_path: Path) -> None:

@@ -214,6 +214,14 @@ class TestMotionPage:
         assert len(own) < 0.2 * len(page)
         assert not re.search(r"https?://|\bsrc=|<link|@import|url\(|fetch\(|XMLHttpRequest|import\(", own)
 
+    def test_points_of_a_cloud_are_marked_as_such(self) -> None:
+        """Curves of one point over time, which is another one in every frame, were drawn."""
+        cloud = sb.Cloud.of([np.zeros((3, 3)), np.ones((3, 3))], [0.0, 0.1])
+        (motion,) = packed_motions([of_recording(cloud, "points")])
+        assert motion["isCloud"] and len(motion["markers"]) == 3
+        (motion,) = packed_motions([of_recording(sb.Recording(np.ones((2, 1, 3)), [0, 1]), "markers")])
+        assert not motion["isCloud"]
+
 
 class TestCommands:
     def test_view_of_a_recording(self, tmp_path: Path) -> None:

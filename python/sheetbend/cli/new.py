@@ -21,9 +21,10 @@ from ..look.draft import Draft, draft
 from ..look.robot import Poses
 from ..look.seen import seen
 from ..look.take import Measured, Take
+from ..recording.io.sidecar import beside
 from ..recording.recording import Recording
 from ..recording.relabeled import shuffled
-from ..recording.unit_doubt import unit_doubt
+from ..recording.unit_doubt import LONGEST, unit_doubt, unit_words
 from .folders import made
 from .gripped import load_ropes
 from .outcome import Json, Outcome, run
@@ -84,7 +85,7 @@ def new(
         float | None, typer.Option(help="Measured length of the rope or beam in m.", show_default=False)
     ] = None,
     units: Annotated[
-        str | None, typer.Option(help="Length unit of the files: m, cm or mm.", show_default=False)
+        str | None, typer.Option(help="Length unit of the files: m, cm, mm, in or ft.", show_default=False)
     ] = None,
     up: Annotated[
         Up | None,
@@ -143,7 +144,7 @@ def _new(
         with options(units="--units"):
             recordings = [_read(file, units) for file in files]
         if markers is not None:
-            recordings = [(_chosen(recording, markers), unit) for recording, unit in recordings]
+            recordings = [(_chosen(recording, markers), unit, words) for recording, unit, words in recordings]
         name = _name(recordings[0][0].name)
     target = output if output is not None else Path(f"{name}.toml")
     if target.suffix.lower() != ".toml":
@@ -163,7 +164,7 @@ def _new(
             measured = replace(
                 measured, poses=Poses.read(poses, Path(os.path.relpath(poses, target.parent)).as_posix())
             )
-    takes = [Take(seen(r, up), file, unit) for file, (r, unit) in zip(named, recordings, strict=True)]
+    takes = [Take(seen(r, up), file, unit, words) for file, (r, unit, words) in zip(named, recordings, strict=True)]
     try:
         found = draft(takes, name, measured)
     except RecordingError as error:
@@ -245,8 +246,9 @@ def _name(recording: str) -> str:
     return "".join(c if c.isascii() and (c.isalnum() or c in "_.-") else "_" for c in recording)
 
 
-def _read(file: Path, units: str | None) -> tuple[Recording, str | None]:
-    """A recording in m, and the unit that the configuration must name: the one that is given, or one told by doubt."""
+def _read(file: Path, units: str | None) -> tuple[Recording, str | None, str]:
+    """A recording in m, the unit that the configuration must name (the one that is given, or the likely one), and a
+    sentence about it."""
     try:
         recording = Recording.load(file, units)
     except RecordingError as error:
@@ -257,5 +259,13 @@ def _read(file: Path, units: str | None) -> tuple[Recording, str | None]:
     if shuffled(recording.positions):
         fix = f"save them with sb.Cloud.of(points, times).save('cloud.npz'), and {CLOUD}"
         raise RecordingError(str(file), "holds points that are in another order in every frame", "a cloud", fix)
-    doubt = None if units is not None else unit_doubt(recording)
-    return (recording.mended(), units) if doubt is None else (Recording.load(file, doubt).mended(), doubt)
+    if units is not None:
+        return recording.mended(), units, f"lengths are taken as {units}"
+    doubt = unit_doubt(recording)
+    if doubt is not None:
+        recording = Recording.load(file, doubt)
+        why = f"because nothing that is recorded like this is larger than {LONGEST:g} m"
+        return recording.mended(), doubt, unit_words(recording, doubt, why)
+    told = file.suffix.lower() == ".npz" or "units" in recording.metadata or "units" in beside(file)
+    why = "because the file does not say its unit"
+    return recording.mended(), None, "" if told else unit_words(recording, "m", why)

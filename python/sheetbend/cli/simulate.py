@@ -14,7 +14,9 @@ from rich.console import Console
 
 from ..config import Study, load, scene_alone
 from ..config.driven_motion import as_simulated
+from ..config.errors import located
 from ..errors import ConfigError
+from ..experiment.checks import check_substep
 from ..experiment.experiment import Experiment
 from ..experiment.force_readings import sensor_readings
 from ..files.door import reading
@@ -153,6 +155,8 @@ def tasks_of(study: Study, duration: float | None, recording: str | None, finer:
     if experiments:
         return [_task(e, duration) for e in experiments]
     scene, solver = scene_alone(study.config, study.folder, 2 if finer else 1)
+    with located("solver", "solver"):
+        check_substep(solver.h, np.array([0.0, duration or DURATION]), "the motion")
     frame = round(max(FRAME / solver.h, 1.0)) * solver.h
     return [
         Task(study.config.experiment.name, scene, solver, np.arange(0.0, (duration or DURATION) + frame / 2, frame))

@@ -37,7 +37,7 @@ def view(
         typer.Option("--output", "-o", help="The HTML file to write. Default: out/NAME.html.", show_default=False),
     ] = None,
     units: Annotated[
-        str | None, typer.Option(help="Length unit of the recording: m, cm or mm.", show_default=False)
+        str | None, typer.Option(help="Length unit of the recording: m, cm, mm, in or ft.", show_default=False)
     ] = None,
     json: Json = False,
 ) -> None:

@@ -160,7 +160,7 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
             scene=scene,
             recording=shown,
             markers=None if section.cloud else places or None,
-            solver=solver_for(config.solver, recording),
+            solver=solver_for(config.solver, recording, section.static),
             forces=forces,
             offsets=offset_names(path, section, scene),
             **fields_of_experiment(section),

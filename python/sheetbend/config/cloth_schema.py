@@ -6,6 +6,7 @@ from typing import Any, Literal, Self
 
 from pydantic import ValidationInfo, field_validator, model_validator
 
+from ..files.units import Length
 from .section import MOST_CELLS, Counts, Finite, Name, Pair, Section, Vector, key
 
 MESH_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
@@ -33,7 +34,7 @@ class ClothMesh(Section):
     rings: int | None = key(None, "of a disk", ge=1, le=MOST_CELLS)
     support: Finite | None = key(None, "radius of a circle of the disk whose vertices are the set `support`", "m", gt=0)
     file: str | None = key(None, "OBJ, PLY or STL, relative to the configuration")
-    unit: Literal["m", "cm", "mm"] | None = key(None, "length unit of the file; m when left out")
+    unit: Length | None = key(None, "length unit of the file; m when left out")
     material: Literal["texture", "unfold"] | None = key(
         None, "where the file's material coordinates come from; its texture when left out and there is one"
     )

@@ -7,6 +7,7 @@ from typing import Literal, Self
 
 from pydantic import model_validator
 
+from ..files.units import Length
 from ..scene.colliders import Box, Capsule, Collider, Cylinder, Plane, Sphere
 from ..scene.distance_field import DistanceField
 from .section import Finite, Name, Section, Vector, key
@@ -59,7 +60,7 @@ class ColliderSection(Section):
         None, "of a box or mesh: a vector along the axis that it is turned about, as long as the angle", "rad"
     )
     file: str | None = key(None, "of a mesh: OBJ, PLY or STL, closed, relative to the configuration")
-    unit: Literal["m", "cm", "mm"] | None = key(None, "of a mesh: length unit of the file; m when left out")
+    unit: Length | None = key(None, "of a mesh: length unit of the file; m when left out")
     position: Vector | None = key(None, "of a mesh: where the origin of its coordinates is", "m")
     spacing: Finite | None = key(
         None, "of a mesh: of the grid of its distances; a 32nd of its longest side when left out", "m", gt=0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 import types
 import typing
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,19 +13,22 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from ..errors import ConfigError, InputError
+from .other_names import meant
 from .section import AXES, NAME, REFERENCE
 
 Location = Sequence[str | int]
 
 
 def from_validation(error: ValidationError, model: type[BaseModel]) -> ConfigError:
-    """The first problem as an error; the others are its notes."""
+    """The first problem as an error; the others are its notes. Unknown keys come before missing ones, of which they may
+    be other names."""
     by_path: dict[str, list[Mapping[str, Any]]] = {}
     for detail in error.errors():
         by_path.setdefault(dotted(_keys(detail["loc"], model)), []).append(dict(detail))
     # Every branch of a union complains; the one whose type fits knows more than the others.
     first, *others = (
-        one(min(details, key=lambda d: d["type"].endswith("_type")), model) for details in by_path.values()
+        one(min(details, key=lambda d: d["type"].endswith("_type")), model)
+        for details in sorted(by_path.values(), key=lambda details: details[0]["type"] != "extra_forbidden")
     )
     for other in others:
         first.add_note(str(other))
@@ -37,20 +41,23 @@ def one(detail: Mapping[str, Any], model: type[BaseModel]) -> ConfigError:
     limits = detail.get("ctx", {})
     field = dotted(path)
     if kind == "extra_forbidden":
-        return _unknown(path, model)
+        return _unknown(path, got, model)
     if kind == "missing":
         return ConfigError(field, "is missing", None, f"add {path[-1]} to {_table(path[:-1])}")
     if kind == "value_error":
         problem, _, fix = str(limits["error"]).partition("|")
         return ConfigError(field, problem, _short(got), fix or "see docs/configuration.md")
     if kind == "string_pattern_mismatch":
-        return ConfigError(
-            field, "has the wrong form", got, _FORMS.get(limits["pattern"], f"match {limits['pattern']}")
-        )
+        form, blank = _FORMS.get(limits["pattern"], f"match {limits['pattern']}"), " " in got.strip()
+        fix = f'write "{"_".join(got.split())}": {form}' if limits["pattern"] == NAME and blank else form
+        return ConfigError(field, "has the wrong form", got, fix)
     wanted = _WANTED.get(kind, "")
     if kind in _LIMITS:
         word, limit = _LIMITS[kind]
         return ConfigError(field, f"must be {word} {limits[limit]:g}", got, f"give a number {word} {limits[limit]:g}")
+    numbers = _numbers(path, model) if kind in ("too_short", "too_long", "list_type") else None
+    if numbers is not None:
+        return ConfigError(field, *_of_numbers(path, got, *numbers))
     if kind in ("too_short", "too_long"):
         wanted = f"at least {limits['min_length']}" if kind == "too_short" else f"at most {limits['max_length']}"
         return ConfigError(field, f"has {limits['actual_length']} entries", got, f"give {wanted}")
@@ -59,8 +66,12 @@ def one(detail: Mapping[str, Any], model: type[BaseModel]) -> ConfigError:
     if kind == "list_type" and isinstance(got, Mapping) and _holds_tables(path, model):
         header = _table(path)[1:-1]
         return ConfigError(field, "must be a list of tables", _short(got), f"write [[{header}]] in place of [{header}]")
+    if kind == "list_type" and isinstance(got, int | float | str) and not isinstance(got, bool):
+        return ConfigError(field, "must be a list in [brackets]", got, f"write {path[-1]} = [{_toml(got)}]")
     if kind in ("float_type", "int_type") and isinstance(got, str):
+        quotient = _quotient(got)
         fix = f"write {got.strip()} without quotes" if _is_number(got) else f"write {wanted}, without quotes and unit"
+        fix = fix if quotient is None else f"write {quotient:.6g}: TOML has no fractions"
         return ConfigError(field, f"must be {wanted}", got, fix)
     return ConfigError(
         field,
@@ -68,6 +79,19 @@ def one(detail: Mapping[str, Any], model: type[BaseModel]) -> ConfigError:
         got,
         f"write {wanted}" if wanted else "see docs/configuration.md",
     )
+
+
+def _of_numbers(path: Location, got: Any, count: int, example: str) -> tuple[str, Any, str]:
+    """Problem, value and fix of what should be a list of so many numbers."""
+    wanted = f"must be {count} numbers in [brackets]"
+    if path[-1] != "gravity":
+        return wanted, got, f"write {path[-1]} = {example}"
+    size = f"{abs(got):g}" if isinstance(got, int | float) else "9.81"  # of which the sign and the axis are not told
+    return wanted, got, f"write gravity = [0, 0, -{size}] if z points up, or [0, -{size}, 0] if y does, in m/s^2"
+
+
+def _toml(got: float | str) -> str:
+    return f'"{got}"' if isinstance(got, str) else f"{got:g}"
 
 
 def _is_number(text: str) -> bool:
@@ -78,11 +102,20 @@ def _is_number(text: str) -> bool:
     return True
 
 
+def _quotient(text: str) -> float | None:
+    """Of a text such as "1/480"."""
+    parts = text.split("/")
+    if len(parts) != 2 or not all(_is_number(part) for part in parts) or float(parts[1]) == 0.0:
+        return None
+    return float(parts[0]) / float(parts[1])
+
+
 _FORMS = {
     NAME: "use letters, digits, _ . and -, a letter first",
     REFERENCE: "write such as 'rope:0', 'rope:end', or the name of a single particle",
     AXES: "name some of x, y, z, such as 'xz'",
 }
+_EXAMPLES = {2: "[first, second]", 3: "[x, y, z]", 4: "[x, y, z, w]"}
 _LIMITS = {
     "greater_than": ("greater than", "gt"),
     "greater_than_equal": ("at least", "ge"),
@@ -163,16 +196,24 @@ def _options(annotation: Any) -> list[Any]:
     return [annotation]
 
 
-def _unknown(path: list[str | int], model: type[BaseModel]) -> ConfigError:
+def _unknown(path: list[str | int], got: Any, model: type[BaseModel]) -> ConfigError:
     known = _fields_at(path[:-1], model)
-    name = str(path[-1])
+    name, keys = str(path[-1]), f"The keys of {_table(path[:-1])} are: "
+    other = _elsewhere(path, got, known, model) or meant(name, known)
+    if other is not None:
+        return ConfigError(dotted(path), "is no known key", name, f"{other} {keys}{', '.join(known)}")
     near = difflib.get_close_matches(name, known, n=1, cutoff=0.6) or [k for k in known if k.lower() == name.lower()]
-    fix = (
-        f"did you mean '{near[0]}'? The keys of {_table(path[:-1])} are: {', '.join(known)}"
-        if near
-        else f"use some of: {', '.join(known)}"
-    )
+    fix = f"did you mean '{near[0]}'? {keys}{', '.join(known)}" if near else f"use some of: {', '.join(known)}"
     return ConfigError(dotted(path), "is no known key", name, fix)
+
+
+def _elsewhere(path: list[str | int], got: Any, known: Sequence[str], model: type[BaseModel]) -> str | None:
+    """How to write a table whose name lacks a part, or has a point too many; None where it is not such a one."""
+    name = str(path[-1])
+    if len(path) == 3 and path[0] == "parameters" and isinstance(got, Mapping):
+        return f"write [parameters.{path[1]}_{name}]."
+    inside = _fields_at(["scene"], model) if len(path) == 1 and "scene" in known else []
+    return f"write [[scene.{name}]]." if name in inside and name not in known else None
 
 
 def _fields_at(path: Location, model: type[BaseModel]) -> list[str]:
@@ -201,6 +242,24 @@ def _annotation(path: Location, model: type[BaseModel]) -> Any:
             else typing.get_args(next(o for o in options if typing.get_origin(o) is dict))[1]
         )
     return here
+
+
+def _numbers(path: Location, model: type[BaseModel]) -> tuple[int, str] | None:
+    """How many numbers the list of a key must have, with an example; None where that is free."""
+    if not path or isinstance(path[-1], int):
+        return None
+    owners = _options(_annotation(path[:-1], model))
+    owner = next((o for o in owners if isinstance(o, type) and issubclass(o, BaseModel)), None)
+    if owner is None:
+        return None
+    shape = owner.model_json_schema()["properties"].get(path[-1], {})
+    kinds = [s for s in (shape, *shape.get("anyOf", ())) if s.get("items", {}).get("type") == "number"]
+    lengths = {s.get("minItems") for s in kinds if s.get("minItems") == s.get("maxItems", -1)}
+    if len(lengths) != 1 or not lengths <= set(_EXAMPLES):
+        return None
+    told = re.match(r"\[[^\]]+\]", str(shape.get("description", "")))
+    count = lengths.pop()
+    return count, told[0] if told else _EXAMPLES[count]
 
 
 def _short(got: Any) -> Any:

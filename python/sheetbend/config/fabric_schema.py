@@ -6,6 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from ..files.units import Length
 from ..textile.drape import Plates
 from .section import Finite, Name, Section, key
 
@@ -82,7 +83,7 @@ class DrapeTest(Section):
     """[drape]: outlines of shadows of the drape test."""
 
     outlines: Files = key(..., "a file for each specimen: points around the shadow, or a picture of it")
-    units: Literal["m", "cm", "mm"] | None = key(None, "of points")
+    units: Length | None = key(None, "of points")
     picture_width: Positive | None = key(None, "how much a picture shows from side to side", "m")
     diameter: Positive = key(0.3, "of the cloth", "m")
     plate: Positive = key(0.18, "of the plates", "m")

@@ -106,6 +106,8 @@ def _line_of(text: str, problem: str) -> str:
 
 def _mended(line: str) -> str:
     """How to mend a line that is no TOML, for the slips that people make."""
+    if "\\" in line:
+        return "write / in place of \\ in a path, or put it in 'single quotes'"
     if re.match(r"[\w.-]+\s*=\s*[-+]?\d+,\d", line):
         return "write a point as decimal mark, or a list in [brackets]"
     if re.match(r"[\w.-]+\s*=\s*[A-Za-z]", line):

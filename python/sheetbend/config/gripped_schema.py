@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
+from ..files.units import Length
 from ..gripped import fit_rope
 from ..minimum.starts import MOST
 from .schema import ExperimentSection, OutputSection
@@ -66,7 +67,7 @@ class GrippedRopeSection(Section):
     train: str = key(..., "folder of the recordings to fit, relative to the configuration")
     eval: str | None = key(None, "folder of recordings that are only predicted, from their first frame")
     pattern: str = key("*", 'which files of these folders, such as "*.pkl"', min_length=1)
-    units: Literal["m", "cm", "mm"] | None = key(None, "length unit of the files; their JSONs' when left out")
+    units: Length | None = key(None, "length unit of the files; their JSONs' when left out")
     clamped: list[str | int] | None = key(
         None, "names or numbers of the gripped markers, two or more at each end; the files' when left out"
     )

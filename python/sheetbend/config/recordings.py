@@ -61,7 +61,8 @@ def _read(section: RecordingSection, folder: Path, path: str, key: str, name: st
         if compared and section.hidden:
             recording = recording.hidden(section.hidden)
     except RecordingError as error:
-        raise ConfigError(f"{where}.{error.field}", error.problem, error.got, error.fix) from error
+        field = f"{path}.{key}" if error.field == str(file) else f"{where}.{error.field}"
+        raise ConfigError(field, error.problem, error.got, error.fix) from error
     doubt = unit_doubt(recording) if section.units is None else None
     if doubt is not None:
         problem = f"are not said, and in the unit that was read the markers are {extent(recording):.4g} m apart"

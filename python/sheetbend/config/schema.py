@@ -6,6 +6,7 @@ from typing import Any, Literal, Self
 
 from pydantic import model_validator
 
+from ..files.units import Length
 from .cloth_schema import MarkerGrid
 from .rope_schema import RopeHere
 from .scene_schema import SceneSection
@@ -103,7 +104,7 @@ class RecordingSection(Section):
         "these drive and hold the scene. Where no marker does, `file` names the cloud too",
     )
     name: Name | None = key(None, "the file's when left out")
-    units: Literal["m", "cm", "mm"] | None = key(None, "length unit of the file; its JSON's when left out")
+    units: Length | None = key(None, "length unit of the file; its JSON's when left out")
     mend: bool = key(
         False, "put back markers that exchange their labels, and do not use those that are elsewhere for some frames"
     )

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
+from ..files.units import Length
 from ..objects.solid import SolidLaw
 from .section import Finite, Name, Section, Vector, key
 
@@ -31,7 +32,7 @@ class SolidSection(Section):
     cells: Cells | None = key(None, "of a box: the number of bricks along x, y and z")
     origin: Vector = key([0.0, 0.0, 0.0], "of a box: its lowest corner", "m")
     file: str | None = key(None, "a mesh of hexahedra or tetrahedra instead, relative to the configuration")
-    unit: Literal["m", "cm", "mm"] = key("m", "of the file")
+    unit: Length = key("m", "of the file")
     material: Name | None = key(None, "prefix of the quantities instead; solids of one material share them")
     density: Finite = key(..., "mass per volume", "kg/m^3", gt=0)
     E: Finite = key(..., "Young's modulus", "Pa", gt=0)

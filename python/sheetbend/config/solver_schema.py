@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import AfterValidator, create_model, model_validator
 
 from ..errors import InputError
+from ..experiment.checks import check_substep
 from ..motion.options import Option
 from ..motion.solver import OPTIONS, Solver, check_option
 from ..recording.recording import Recording
@@ -60,10 +61,17 @@ else:
     SolverSection = create_model("SolverSection", __base__=_Substep, __doc__=_Substep.__doc__, **_KEYS)
 
 
-def solver_for(section: SolverSection, recording: Recording | None) -> Solver:
-    """The solver, its substep taken from the recording's median frame interval where `h` is not given."""
+def solver_for(section: SolverSection, recording: Recording | None, static: bool = False) -> Solver:
+    """The solver, its substep taken from the recording's median frame interval where `h` is not given.
+
+    Raises:
+        ConfigError: the substep is too long for the motion; of a `static` recording it does not matter.
+    """
     given = section.model_dump(exclude={"substeps"}, exclude_none=True)
     if "h" not in given and recording is not None and len(recording.times) > 1:
         given["h"] = float(np.median(np.diff(recording.times))) / (section.substeps or SUBSTEPS)
     with located("solver", "solver"):
-        return Solver(**given)
+        solver = Solver(**given)
+        if recording is not None and not static:
+            check_substep(solver.h, recording.times)
+    return solver

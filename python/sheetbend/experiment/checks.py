@@ -12,6 +12,7 @@ from ..recording.windows import Window
 from ..scene.scene import Scene
 from .force_sensor import ForceSensor
 
+MOST_SUBSTEPS = 1e8  # of a recording: more take days
 LOSSES = ("squares", "soft_l1", "huber", "cauchy")  # the last for clouds alone
 
 
@@ -68,6 +69,32 @@ def _is_window(window: object) -> bool:
     """Whether it is a pair of times, of which infinite ones are open ends."""
     pair = isinstance(window, Sequence | np.ndarray) and not isinstance(window, str) and len(window) == 2
     return pair and all(is_bound(t) for t in window)  # type: ignore[attr-defined]
+
+
+def check_substep(h: float, times: np.ndarray, of: str = "the recording") -> None:
+    """Refuse a substep that is longer than the recording, or than a second where frames are ten times as dense (such a
+    number is the rate that was meant), or so short that nothing would ever end.
+
+    Args:
+        h: s.
+        times: (frames,) s, of what is simulated.
+        of: what that is.
+
+    Raises:
+        InputError: it names `solver.h`.
+    """
+    if len(times) < 2:
+        return
+    span, interval = float(times[-1] - times[0]), float(np.median(np.diff(times)))
+    if span / h > MOST_SUBSTEPS:
+        problem, fix = f"makes {span / h:.2g} substeps of {span:.4g} s", f"give such as {interval / 10:.3g}"
+        raise InputError("solver.h", problem, h, fix)
+    if h <= span and not (h > 1.0 and h > 10.0 * interval):
+        return
+    problem = f"is the time of a substep, and {h:g} s is longer than "
+    problem += f"{of} of {span:.4g} s" if h > span else f"ten frame intervals of {interval:.4g} s"
+    fix = f"give {1 / h:.4g} for {h:g} substeps in a second" if h > 1.0 else f"give such as {interval / 10:.3g}"
+    raise InputError("solver.h", problem, h, fix)
 
 
 def check_driven_sigma(name: str, given: float | str | None, scene: Scene) -> None:

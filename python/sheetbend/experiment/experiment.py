@@ -18,7 +18,7 @@ from ..recording.cloud import Cloud
 from ..recording.recording import Recording
 from ..recording.windows import Window
 from ..scene.scene import Scene
-from .checks import check_driven_sigma, check_errors, check_forces, check_parts
+from .checks import check_driven_sigma, check_errors, check_forces, check_parts, check_substep
 from .correction import Correction, recorded_noise
 from .estimated_start import EstimatedStart, together
 from .force_sensor import INPUTS, ForceSensor
@@ -106,6 +106,8 @@ class Experiment:
             not_yet["start"] = "estimated" if self.start == "estimated" else None
             check_cloud(self.name, self.scene, of_markers, not_yet)
         check_errors(self.name, self.axes, self.radius, self.loss, self.loss_scale, self.sigma, self.is_cloud)
+        if not self.static:
+            check_substep(self.solver.h, self.recording.times)
         check_parts(self.name, self.fit, self.held_out, self.static, self.start, self.start_time, self.predict)
         corrected, late = self.driven_sigma is not None, self.time_offset is not None
         check_driven_sigma(self.name, self.driven_sigma, self.scene)

@@ -1,3 +1,6 @@
 """The units of length that files may be in."""
 
-METERS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+from typing import Literal, get_args
+
+Length = Literal["m", "cm", "mm", "in", "ft"]
+METERS = dict(zip(get_args(Length), (1.0, 1e-2, 1e-3, 0.0254, 0.3048), strict=True))

@@ -124,8 +124,8 @@ def _told(takes: Sequence[Take], up: int | None) -> list[str]:
                 f"between two frames it moves up to {far:.2g} m, farther than from one marker to the next: the motion "
                 "between frames is not known. Record at a higher rate"
             )
-    if takes[0].units is not None:
-        said.append(f"lengths are taken as {takes[0].units}")
+    if takes[0].about_units:
+        said.append(takes[0].about_units)
     if first.up_by == "guess" and up is not None:
         said.append(f"{'xyz'[up]} points up, as the motion shows")
     elif first.up_by == "guess":

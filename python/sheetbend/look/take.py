@@ -15,11 +15,13 @@ from .text import table
 
 @dataclass(frozen=True)
 class Take:
-    """A recording for a draft: what it shows, and how the configuration calls its file and its unit."""
+    """A recording for a draft: what it shows, how the configuration calls its file and its unit, and a sentence about
+    the unit where there is one to say."""
 
     seen: Seen
     file: str
     units: str | None = None
+    about_units: str = ""
 
     @property
     def reading(self) -> dict[str, Any]:

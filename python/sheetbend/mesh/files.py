@@ -53,7 +53,7 @@ def read_mesh(
         material: "texture" takes the file's texture coordinates, "unfold" takes the shape in the file as flat fabric
             unrolled (`unfold`), an array gives the coordinates, (n, 2) or (m, 3, 2) m. None: "texture" where the file
             has it, else "unfold".
-        unit: of the file's positions, "m", "cm" or "mm".
+        unit: of the file's positions, "m", "cm", "mm", "in" or "ft".
         texture_size: m per unit of texture coordinates, one number or (u, v).
         warp: (3,) direction of warp for "unfold".
         merge: make one vertex of those at equal positions, as exporters split them where normals differ.

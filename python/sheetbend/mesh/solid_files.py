@@ -30,7 +30,7 @@ def read_solid(path: str | Path, unit: str = "m") -> SolidMesh:
 
     Args:
         path: a file of Gmsh (.msh), VTK (.vtk, .vtu), Abaqus (.inp) or MEDIT (.mesh).
-        unit: of the file's positions, "m", "cm" or "mm".
+        unit: of the file's positions, "m", "cm", "mm", "in" or "ft".
 
     Warns:
         UserWarning: elements of other kinds, which are left out.

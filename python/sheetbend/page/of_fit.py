@@ -124,7 +124,8 @@ def _motions(found: Fit) -> tuple[list[Shown], list[str]]:
 def _markers_alone(c: Comparison) -> Shown:
     x = c.recording.positions[:1] if c.experiment.static else c.recording.positions
     times = c.recording.times[: len(x)]
-    return Shown(c.experiment.name, times, markers=tuple(c.recording.markers), measured=x, held_out=c.held_out)
+    names, is_cloud = tuple(c.recording.markers), c.experiment.is_cloud
+    return Shown(c.experiment.name, times, markers=names, is_cloud=is_cloud, measured=x, held_out=c.held_out)
 
 
 def _tone(result: FitResult) -> str:

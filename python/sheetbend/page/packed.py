@@ -57,6 +57,7 @@ def _packed(motion: Shown, most: int) -> dict[str, Any]:
         "scale": scale,
         "up": motion.up.tolist(),
         "markers": list(motion.markers),
+        "isCloud": motion.is_cloud,
         "measured": places(motion.measured),
         "simulated": places(motion.simulated),
         "baseline": places(motion.baseline),

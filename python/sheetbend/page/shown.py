@@ -15,6 +15,7 @@ from ..motion.simulate import Trajectory
 from ..pictures.body_lines import body_lines
 from ..pictures.collider_lines import collider_lines
 from ..pictures.strain import largest_strain
+from ..recording.cloud import Cloud
 from ..recording.recording import Recording
 from ..scene.scene import Scene
 
@@ -45,6 +46,7 @@ class Shown:
             and the outlines of colliders.
         sheets: cloths and surfaces of solids by name.
         markers: names of the measured markers.
+        is_cloud: whether they are points of a cloud, other ones in every frame.
         measured, simulated, baseline: (frames, markers, 3) m, NaN where there is nothing; None without.
         held_out: (frames,) frames that the fit did not see.
         up: (3,) against gravity; zeros without gravity.
@@ -57,6 +59,7 @@ class Shown:
     ticks: Mapping[str, Array] = field(default_factory=dict)
     sheets: Mapping[str, Sheet] = field(default_factory=dict)
     markers: tuple[str, ...] = ()
+    is_cloud: bool = False
     measured: Array | None = None
     simulated: Array | None = None
     baseline: Array | None = None
@@ -77,6 +80,7 @@ def fitted_motion(found: Fit, c: Comparison) -> Shown:
     e = c.experiment
     recorded = {
         "markers": tuple(c.recording.markers),
+        "is_cloud": e.is_cloud,
         "measured": c.recording.positions,
         "simulated": c.simulated,
         "baseline": c.baseline,
@@ -112,7 +116,8 @@ def of_positions(scene: Scene, times: Array, positions: Array, name: str = "") -
 def of_recording(recording: Recording, name: str) -> Shown:
     """The markers of a recording."""
     x, up = recording.positions, _up(recording, np.zeros(3))
-    return Shown(name, recording.times, markers=tuple(recording.markers), measured=x, up=up)
+    names, is_cloud = tuple(recording.markers), isinstance(recording, Cloud)
+    return Shown(name, recording.times, markers=names, is_cloud=is_cloud, measured=x, up=up)
 
 
 def _shown(name: str, scene: Scene, times: Array, positions: Array, recorded: Mapping[str, object]) -> Shown:

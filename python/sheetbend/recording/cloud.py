@@ -76,7 +76,8 @@ class Cloud(Recording):
         of them each frame has, and `times` (frames,) s. A JSON of the same stem adds units, gravity and metadata.
 
         Args:
-            units: length unit of the file, "m", "cm" or "mm"; None takes the JSON's, and meters without one.
+            units: length unit of the file, "m", "cm", "mm", "in" or "ft"; None takes the JSON's, and m
+                without one.
 
         Raises:
             RecordingError: the file is missing, corrupt or no valid cloud.

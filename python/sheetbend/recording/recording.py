@@ -59,7 +59,8 @@ class Recording(MarkerData):
         Args:
             path: an .npz, .npy, .csv, .tsv, .txt, .c3d, .trc or .pkl file, or a folder of OBJ or PLY files with one
                 frame each; docs/recordings.md describes them.
-            units: length unit of the file, "m", "cm" or "mm"; None takes the JSON's, and meters without one.
+            units: length unit of the file, "m", "cm", "mm", "in" or "ft"; None takes the JSON's, and m
+                without one.
 
         Raises:
             RecordingError: the file is missing, empty, corrupt, of an unknown kind or no valid recording.

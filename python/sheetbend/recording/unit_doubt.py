@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..files.units import METERS
+from ..quantities.wording import short
 from .recording import Recording
 
 LONGEST = 20.0  # m, of what is recorded in meters: nothing that hangs in a hand is 700 m long
@@ -13,6 +15,22 @@ def extent(recording: Recording) -> float:
     """m, the diagonal of the box that all markers stay in."""
     x = recording.positions
     return float(np.linalg.norm(np.nanmax(x, axis=(0, 1)) - np.nanmin(x, axis=(0, 1))))
+
+
+def unit_words(recording: Recording, unit: str, why: str) -> str:
+    """What a unit that nobody gave makes of a recording, and what others would.
+
+    Args:
+        recording: in m, by `unit`.
+        unit: that was taken.
+        why: it was, a clause.
+    """
+    size = extent(recording) / METERS[unit]
+    others = ", ".join(f"in {other} {short(size * METERS[other], 3)} m" for other in METERS if other != unit)
+    return (
+        f"lengths are taken as {unit}, {why}. The markers then move within {short(size * METERS[unit], 3)} m ({others})"
+        ". If another unit is right, begin again with --units"
+    )
 
 
 def unit_doubt(recording: Recording) -> str | None:

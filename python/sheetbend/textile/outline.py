@@ -83,7 +83,7 @@ def read_outline(path: str | Path, *, units: str | None = None, width: float | N
 
     Args:
         path: of the file.
-        units: of a table: "m", "cm" or "mm".
+        units: of a table: "m", "cm", "mm", "in" or "ft".
         width: of a picture from side to side, m.
 
     Raises:

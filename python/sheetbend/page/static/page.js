@@ -52,7 +52,10 @@ const page = {
     this.element("about-motion").textContent = drawn + words.join("") + (this.space.cell ? `A cell of the floor is ${length(this.space.cell)}. ` : "") + (motion.heldOut.some(Boolean) && motion.frames > 1 ? "Shaded times were held out: the fit did not see them." : "");
     const marker = this.element("marker");
     marker.replaceChildren(...motion.markers.map((name, m) => new Option(name, m)));
-    this.element("residuals").hidden = !(motion.measured && motion.frames > 1);
+    // Points of a cloud are other ones in every frame: only their distances mean something over time.
+    this.element("residuals").hidden = !(motion.measured && motion.frames > 1 && (motion.residual || !motion.isCloud));
+    this.element("of-marker").hidden = motion.isCloud;
+    this.element("what").textContent = motion.isCloud ? "points" : "markers";
     this.element("residuals").querySelector("h2").textContent = motion.simulated ? "Measured against simulated" : "Markers over time";
     this.charts();
     const asked = Number(new URLSearchParams(location.hash.slice(1)).get("t")); // page.html#t=0.8 opens at 0.8 s
@@ -77,9 +80,10 @@ const page = {
   charts() {
     if (this.element("residuals").hidden) return;
     const residual = Boolean(this.motion.residual);
-    for (const id of ["over-time", "per-marker"]) this.element(id).closest("figure").hidden = !residual;
+    this.element("over-time").closest("figure").hidden = !residual;
+    this.element("per-marker").closest("figure").hidden = !residual || this.motion.isCloud;
     if (residual) residualCharts(this.motion);
-    markerCharts(this.motion, Number(this.element("marker").value));
+    if (!this.motion.isCloud) markerCharts(this.motion, Number(this.element("marker").value));
   },
 
   mark(marker) {

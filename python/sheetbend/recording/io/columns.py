@@ -14,7 +14,7 @@ AXES = ("x", "y", "z")
 FIX = "name the columns of each marker <marker>_x, <marker>_y, <marker>_z"
 _LONGEST = 200  # characters of a name
 _UNIT = re.compile(
-    r"(.*[^\s\[(])[\s_]*[\[(]\s*(mm|cm|m)\s*[\])]|(.*[_. ]?[xyz]\d*)[_ ](mm|cm|m)", re.IGNORECASE | re.DOTALL
+    r"(.*[^\s\[(])[\s_]*[\[(]\s*(mm|cm|m|in|ft)\s*[\])]|(.*[_. ]?[xyz]\d*)[_ ](mm|cm|m)", re.IGNORECASE | re.DOTALL
 )
 _WAYS = (
     re.compile(r"(?P<marker>.*)[_.: -](?P<axis>[xyz])", re.IGNORECASE | re.DOTALL),
@@ -80,7 +80,7 @@ def _marker(way: re.Pattern[str], names: Sequence[str]) -> str | None:
 def _refuse_three(path: Path, line: int, names: Sequence[str]) -> NoReturn:
     axes = [name[-1:].lower() for name in names]
     if axes == ["x", "y", "x"] or (len(names) == 2 and axes == ["x", "y"]):
-        fix = "write a third column for each marker, of zeros if all moves in one plane, and lengths in m, cm or mm"
+        fix = "write a third column for each marker, of zeros if all moves in one plane; lengths, not pixels"
         refuse(path, line, "has only x and y of a marker", names[0], fix)
     first = _WAYS[0].fullmatch(names[0])
     marker = first["marker"] if first and first["axis"].lower() == "x" else names[0]

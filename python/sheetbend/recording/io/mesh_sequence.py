@@ -33,7 +33,12 @@ def read(path: Path) -> MarkerData:
     files = sorted((p for p in path.iterdir() if p.suffix.lower() in SUFFIXES), key=by_number)
     if len({file.suffix.lower() for file in files}) != 1:
         inside = sorted(p.name for p in path.iterdir())[:5]
-        raise RecordingError(str(path), f"holds no sequence of {' or of '.join(SUFFIXES)}", inside, "give its folder")
+        raise RecordingError(
+            str(path),
+            f"holds no sequence of {' or of '.join(SUFFIXES)}",
+            inside,
+            "give a recording's file, or the folder of a sequence of meshes",
+        )
     if "rate" not in sidecar.beside(path):
         fix = f'write {{"rate": 25, "units": "m"}} with the frames per second into {path.with_suffix(".json").name}'
         raise RecordingError(str(path.with_suffix(".json")), "does not say the rate", "no rate", fix)

@@ -1,6 +1,6 @@
 """The JSON beside a recording: what its numbers mean and where they come from.
 
-    units     text that starts with the length unit of the file, m, cm or mm ("mm" or "m, s, N"); default m
+    units     text that starts with the length unit of the file, m, cm, mm, in or ft ("mm" or "m, s, N"); default m
     name      what reports call the recording; default: the file's stem
     markers   list of names, for files that have none
     clamped   list of names or indices of driven markers, for files that do not say
