@@ -4,7 +4,9 @@
 // exp(weight theta), one per mode.
 #pragma once
 
+#include <algorithm>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "core/scalar/dual.h"
@@ -67,7 +69,8 @@ T slope(Factor1d f, const T& x, double weight) {
   throw std::logic_error("unknown factor of a parameter map");
 }
 
-struct ParameterMap {
+// The terms as files and Python hold them.
+struct ParameterTerms {
   std::vector<double> base;          // one per input
   std::vector<int> target;           // per term
   std::vector<double> coefficient;   // per term
@@ -76,28 +79,71 @@ struct ParameterMap {
   std::vector<Factor1d> function;    // per factor
   std::vector<double> weight;        // per factor
 
+  int factor_count(std::size_t term) const { return first_factor[term + 1] - first_factor[term]; }
+  bool same_factors(std::size_t s, std::size_t t) const {
+    const auto alike = [&](const auto& of) {
+      const auto first = of.begin() + first_factor[s];
+      return std::equal(first, first + factor_count(s), of.begin() + first_factor[t]);
+    };
+    return factor_count(s) == factor_count(t) && alike(parameter) && alike(function) && alike(weight);
+  }
+};
+
+// Terms that follow each other with the same factors share their product: a mode of a rope has one product and a coefficient at
+// each link, and a rope of 48 links with all that the recipe may fit has 69,000 terms and 219 products.
+class ParameterMap {
+ public:
+  ParameterMap() = default;
+  explicit ParameterMap(ParameterTerms terms) : terms_(std::move(terms)) {
+    product_.reserve(terms_.target.size());
+    for (std::size_t t = 0; t < terms_.target.size(); ++t) {
+      if (t == 0 || !terms_.same_factors(t - 1, t)) term_.push_back(t);
+      product_.push_back(static_cast<int>(term_.size()) - 1);
+    }
+  }
+
+  const ParameterTerms& terms() const { return terms_; }
+
+  // Adds inputs that are zero.
+  void extend(std::size_t inputs) { terms_.base.resize(terms_.base.size() + inputs); }
+
   template <class T>
   void apply(const T* theta, T* inputs) const {
-    for (std::size_t i = 0; i < base.size(); ++i) inputs[i] = T(base[i]);
-    for (std::size_t t = 0; t < target.size(); ++t) {
-      T product(coefficient[t]);
-      for (int k = first_factor[t]; k < first_factor[t + 1]; ++k)
-        product *= evaluate(function[k], theta[parameter[k]], weight[k]);
-      inputs[target[t]] += product;
-    }
+    std::vector<T> products;
+    products.reserve(term_.size());
+    for (const std::size_t t : term_) products.push_back(product_without(theta, t, -1));
+    for (std::size_t i = 0; i < terms_.base.size(); ++i) inputs[i] = T(terms_.base[i]);
+    for (std::size_t t = 0; t < product_.size(); ++t)
+      inputs[terms_.target[t]] += terms_.coefficient[t] * products[product_[t]];
   }
 
   // theta_bar += (d inputs / d theta)^T inputs_bar
   template <class T>
   void pull_back(const T* theta, const T* inputs_bar, T* theta_bar) const {
-    for (std::size_t t = 0; t < target.size(); ++t)
-      for (int k = first_factor[t]; k < first_factor[t + 1]; ++k) {
-        T product = T(coefficient[t]) * slope(function[k], theta[parameter[k]], weight[k]) * inputs_bar[target[t]];
-        for (int j = first_factor[t]; j < first_factor[t + 1]; ++j)
-          if (j != k) product *= evaluate(function[j], theta[parameter[j]], weight[j]);
-        theta_bar[parameter[k]] += product;
+    std::vector<T> products_bar(term_.size(), T(0.0));
+    for (std::size_t t = 0; t < product_.size(); ++t)
+      products_bar[product_[t]] += terms_.coefficient[t] * inputs_bar[terms_.target[t]];
+    for (std::size_t p = 0; p < term_.size(); ++p)
+      for (int k = terms_.first_factor[term_[p]]; k < terms_.first_factor[term_[p] + 1]; ++k) {
+        const int j = terms_.parameter[k];
+        const T one = slope(terms_.function[k], theta[j], terms_.weight[k]);
+        theta_bar[j] += products_bar[p] * one * product_without(theta, term_[p], k);
       }
   }
+
+ private:
+  // The product of a term's factors but one.
+  template <class T>
+  T product_without(const T* theta, std::size_t term, int factor) const {
+    T product(1.0);
+    for (int k = terms_.first_factor[term]; k < terms_.first_factor[term + 1]; ++k)
+      if (k != factor) product *= evaluate(terms_.function[k], theta[terms_.parameter[k]], terms_.weight[k]);
+    return product;
+  }
+
+  ParameterTerms terms_;
+  std::vector<int> product_;       // per term
+  std::vector<std::size_t> term_;  // per product, the first that has it
 };
 
 }  // namespace sheetbend
