@@ -57,7 +57,8 @@ void Experiment::check() const {
     throw std::invalid_argument(name + ": an equilibrium has one frame. Fix: give each shape as a recording");
   if (least.size() != most.size() || (!least.empty() && least.size() != scene->layout.total()))
     throw std::invalid_argument(name + ": the ranges do not fit the scene");
-  if (map.base.size() != inputs()) throw std::invalid_argument(name + ": the parameter map does not fit the scene");
+  if (map.terms().base.size() != inputs())
+    throw std::invalid_argument(name + ": the parameter map does not fit the scene");
   if (correction.first.size() != correction.given.size() + 1 || correction.sigma.size() != correction.given.size())
     throw std::invalid_argument(name + ": the correction does not fit its own numbers");
   if (std::any_of(correction.sigma.begin() + correction.unknowns(), correction.sigma.end(),

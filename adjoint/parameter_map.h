@@ -4,7 +4,9 @@
 // each mode: a term takes one exponential for all of them, and its derivatives take time in proportion to their number.
 #pragma once
 
+#include <algorithm>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "core/scalar/dual.h"
@@ -32,7 +34,7 @@ Dual<T, N> exp(const Dual<T, N>& a) {
   return Dual<T, N>::map(a, e, e);
 }
 
-// Of all functions but the exponential, whose arguments a term sums first (`ParameterMap::product`).
+// Of all functions but the exponential, whose arguments a term sums first (`ParameterMap::product_without`).
 template <class T>
 T evaluate(Factor1d f, const T& x) {
   switch (f) {
@@ -67,7 +69,8 @@ T slope(Factor1d f, const T& x) {
   throw std::logic_error("unknown factor of a parameter map");
 }
 
-struct ParameterMap {
+// The terms as files and Python hold them.
+struct ParameterTerms {
   std::vector<double> base;          // one per input
   std::vector<int> target;           // per term
   std::vector<double> coefficient;   // per term
@@ -76,42 +79,83 @@ struct ParameterMap {
   std::vector<Factor1d> function;    // per factor
   std::vector<double> weight;        // per factor; counts in exponentials alone
 
+  int factor_count(std::size_t term) const { return first_factor[term + 1] - first_factor[term]; }
+  bool same_factors(std::size_t s, std::size_t t) const {
+    const auto alike = [&](const auto& of) {
+      const auto first = of.begin() + first_factor[s];
+      return std::equal(first, first + factor_count(s), of.begin() + first_factor[t]);
+    };
+    return factor_count(s) == factor_count(t) && alike(parameter) && alike(function) && alike(weight);
+  }
+};
+
+// Terms that follow each other with the same factors share their product: a mode of a rope has one product and a coefficient at
+// each link, and a rope of 48 links with all that the recipe may fit has 69,000 terms and 219 products.
+class ParameterMap {
+ public:
+  ParameterMap() = default;
+  explicit ParameterMap(ParameterTerms terms) : terms_(std::move(terms)) {
+    product_.reserve(terms_.target.size());
+    for (std::size_t t = 0; t < terms_.target.size(); ++t) {
+      if (t == 0 || !terms_.same_factors(t - 1, t)) term_.push_back(t);
+      product_.push_back(static_cast<int>(term_.size()) - 1);
+    }
+  }
+
+  const ParameterTerms& terms() const { return terms_; }
+
+  // Adds inputs that are zero.
+  void extend(std::size_t inputs) { terms_.base.resize(terms_.base.size() + inputs); }
+
   template <class T>
   void apply(const T* theta, T* inputs) const {
-    for (std::size_t i = 0; i < base.size(); ++i) inputs[i] = T(base[i]);
-    for (std::size_t t = 0; t < target.size(); ++t) inputs[target[t]] += product(t, theta);
+    std::vector<T> products;
+    products.reserve(term_.size());
+    for (const std::size_t t : term_) products.push_back(product_without(theta, t, -1));
+    for (std::size_t i = 0; i < terms_.base.size(); ++i) inputs[i] = T(terms_.base[i]);
+    for (std::size_t t = 0; t < product_.size(); ++t)
+      inputs[terms_.target[t]] += terms_.coefficient[t] * products[product_[t]];
   }
 
   // theta_bar += (d inputs / d theta)^T inputs_bar
   template <class T>
   void pull_back(const T* theta, const T* inputs_bar, T* theta_bar) const {
-    for (std::size_t t = 0; t < target.size(); ++t) {
-      const T& bar = inputs_bar[target[t]];
-      const T whole = product(t, theta) * bar;
-      for (int k = first_factor[t]; k < first_factor[t + 1]; ++k)
-        theta_bar[parameter[k]] += function[k] == Factor1d::exponential
-                                       ? weight[k] * whole
-                                       : slope(function[k], theta[parameter[k]]) * product(t, theta, k) * bar;
+    std::vector<T> products_bar(term_.size(), T(0.0));
+    for (std::size_t t = 0; t < product_.size(); ++t)
+      products_bar[product_[t]] += terms_.coefficient[t] * inputs_bar[terms_.target[t]];
+    for (std::size_t p = 0; p < term_.size(); ++p) {
+      const T whole = product_without(theta, term_[p], -1) * products_bar[p];
+      for (int k = terms_.first_factor[term_[p]]; k < terms_.first_factor[term_[p] + 1]; ++k) {
+        const int j = terms_.parameter[k];
+        theta_bar[j] +=
+            terms_.function[k] == Factor1d::exponential
+                ? terms_.weight[k] * whole
+                : slope(terms_.function[k], theta[j]) * product_without(theta, term_[p], k) * products_bar[p];
+      }
     }
   }
 
  private:
-  // Of term t: its coefficient times all factors but `without`, with one exponential of the sum of weight theta.
+  // The product of a term's factors but one, with one exponential of the sum of weight theta.
   template <class T>
-  T product(std::size_t t, const T* theta, int without = -1) const {
-    T found(coefficient[t]), sum(0.0);
+  T product_without(const T* theta, std::size_t term, int factor) const {
+    T found(1.0), sum(0.0);
     bool grows = false;
-    for (int k = first_factor[t]; k < first_factor[t + 1]; ++k) {
-      if (k == without) continue;
-      if (function[k] == Factor1d::exponential) {
-        sum += weight[k] * theta[parameter[k]];
+    for (int k = terms_.first_factor[term]; k < terms_.first_factor[term + 1]; ++k) {
+      if (k == factor) continue;
+      if (terms_.function[k] == Factor1d::exponential) {
+        sum += terms_.weight[k] * theta[terms_.parameter[k]];
         grows = true;
       } else {
-        found *= evaluate(function[k], theta[parameter[k]]);
+        found *= evaluate(terms_.function[k], theta[terms_.parameter[k]]);
       }
     }
     return grows ? found * exp(sum) : found;
   }
+
+  ParameterTerms terms_;
+  std::vector<int> product_;       // per term
+  std::vector<std::size_t> term_;  // per product, the first that has it
 };
 
 }  // namespace sheetbend

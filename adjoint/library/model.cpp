@@ -34,7 +34,7 @@ std::vector<double> checked_values(const Model& model, std::span<const double> v
 
 std::vector<double> checked_inputs(const Model& model, std::span<const double> values) {
   const std::vector<double> theta = checked_values(model, values);
-  std::vector<double> inputs(model.map.base.size());
+  std::vector<double> inputs(model.map.terms().base.size());
   model.map.apply(theta.data(), inputs.data());
   for (std::size_t i = 0; i < inputs.size(); ++i)
     if (!(inputs[i] >= model.least[i] && inputs[i] <= model.most[i]))

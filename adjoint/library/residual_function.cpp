@@ -54,7 +54,7 @@ Experiment experiment_of(const Scene& scene, Observations observed, Solver solve
   e.scene = {model, &model->topology};
   e.plan = plan_of(*model, solver);
   e.map = model->map;
-  e.map.base.resize(model->map.base.size() + 3 * observed.markers.size() + 1);  // no offsets of markers or of time
+  e.map.extend(3 * observed.markers.size() + 1);  // no offsets of markers or of time
   e.least = model->least;
   e.most = model->most;
   for (const Marker& m : observed.markers) {

@@ -205,7 +205,7 @@ class SceneReader {
   }
 
   ParameterMap map(const Layout& layout, std::size_t quantities) {
-    ParameterMap m;
+    ParameterTerms m;
     m.base = base_;
     m.target = file_.whole_numbers("target");
     const auto entries = static_cast<long long>(m.target.size());
@@ -226,13 +226,13 @@ class SceneReader {
     within("parameter", m.parameter, quantities);
     within("function", function, factor_count);
     for (const int f : function) m.function.push_back(static_cast<Factor1d>(f));
-    return m;
+    return ParameterMap(std::move(m));
   }
 
   void check_base(const Layout& layout, const ParameterMap& map) {
     for (int q = 0; q < quantity_count; ++q) {
       const auto array = static_cast<Quantity>(q);
-      const double *first = map.base.data() + layout.offset[q], *last = first + layout.size[q];
+      const double *first = map.terms().base.data() + layout.offset[q], *last = first + layout.size[q];
       if (not_negative(array) && std::any_of(first, last, [](double v) { return v < 0.0; }))
         file_.fail(std::string("base.") + quantity_names[q], "must not be negative");
       const bool made = array == Quantity::volume || array == Quantity::volume_compliance ||

@@ -20,8 +20,8 @@ std::optional<Fault> fault_of(const Scene& scene, const ParameterMap& map) {
   if (first_free(scene, none) < 0)
     return Fault{"particles", "nothing can move: every particle is pinned or driven", "release at least one"};
   const auto mass = static_cast<int>(scene.layout.of(Quantity::mass));
-  for (int n = 0; n < scene.nodes(); ++n) heavy[n] = map.base[mass + n] > 0.0;
-  for (const int input : map.target)
+  for (int n = 0; n < scene.nodes(); ++n) heavy[n] = map.terms().base[mass + n] > 0.0;
+  for (const int input : map.terms().target)
     if (input >= mass && input < mass + scene.nodes()) heavy[input - mass] = true;
   if (const int n = first_free(scene, heavy); n >= 0)
     return Fault{"mass", "is zero for free particle " + std::to_string(n), "give it a mass, or pin it"};

@@ -7,35 +7,36 @@
 namespace sheetbend::bindings {
 
 ParameterMap make_map(const py::dict& d) {
-  ParameterMap map;
+  ParameterTerms terms;
   const auto base = d["base"].cast<Array>(), coefficient = d["coefficient"].cast<Array>(),
              weight = d["weight"].cast<Array>();
-  map.base.assign(base.data(), base.data() + base.size());
-  map.coefficient.assign(coefficient.data(), coefficient.data() + coefficient.size());
-  map.weight.assign(weight.data(), weight.data() + weight.size());
-  map.target = whole_numbers(d["target"]);
-  map.first_factor = whole_numbers(d["first_factor"]);
-  map.parameter = whole_numbers(d["parameter"]);
-  for (const int f : whole_numbers(d["function"])) map.function.push_back(static_cast<Factor1d>(f));
-  return map;
+  terms.base.assign(base.data(), base.data() + base.size());
+  terms.coefficient.assign(coefficient.data(), coefficient.data() + coefficient.size());
+  terms.weight.assign(weight.data(), weight.data() + weight.size());
+  terms.target = whole_numbers(d["target"]);
+  terms.first_factor = whole_numbers(d["first_factor"]);
+  terms.parameter = whole_numbers(d["parameter"]);
+  for (const int f : whole_numbers(d["function"])) terms.function.push_back(static_cast<Factor1d>(f));
+  return ParameterMap(std::move(terms));
 }
 
 namespace {
 
 // What make_map takes.
 py::dict arrays_of(const ParameterMap& map) {
+  const ParameterTerms& terms = map.terms();
   const auto numbers = [](const std::vector<int>& values) {
     return py::array_t<int>(static_cast<py::ssize_t>(values.size()), values.data());
   };
   std::vector<int> function;
-  for (const Factor1d f : map.function) function.push_back(static_cast<int>(f));
+  for (const Factor1d f : terms.function) function.push_back(static_cast<int>(f));
   py::dict d;
-  d["base"] = to_numpy(map.base, {static_cast<py::ssize_t>(map.base.size())});
-  d["coefficient"] = to_numpy(map.coefficient, {static_cast<py::ssize_t>(map.coefficient.size())});
-  d["weight"] = to_numpy(map.weight, {static_cast<py::ssize_t>(map.weight.size())});
-  d["target"] = numbers(map.target);
-  d["first_factor"] = numbers(map.first_factor);
-  d["parameter"] = numbers(map.parameter);
+  d["base"] = to_numpy(terms.base, {static_cast<py::ssize_t>(terms.base.size())});
+  d["coefficient"] = to_numpy(terms.coefficient, {static_cast<py::ssize_t>(terms.coefficient.size())});
+  d["weight"] = to_numpy(terms.weight, {static_cast<py::ssize_t>(terms.weight.size())});
+  d["target"] = numbers(terms.target);
+  d["first_factor"] = numbers(terms.first_factor);
+  d["parameter"] = numbers(terms.parameter);
   d["function"] = numbers(function);
   return d;
 }
@@ -48,14 +49,14 @@ void bind_map(py::module_& m) {
       .def(py::pickle(&arrays_of, &make_map))
       .def("inputs",
            [](const ParameterMap& map, const Array& theta) {
-             py::array_t<double> out(static_cast<py::ssize_t>(map.base.size()));
+             py::array_t<double> out(static_cast<py::ssize_t>(map.terms().base.size()));
              map.apply(theta.data(), out.mutable_data());
              return out;
            })
       .def("inputs_dot",
            [](const ParameterMap& map, const Array& theta, const Array& theta_dot) {
              using D = Dual<double, 1>;
-             std::vector<D> in(theta.data(), theta.data() + theta.size()), out(map.base.size());
+             std::vector<D> in(theta.data(), theta.data() + theta.size()), out(map.terms().base.size());
              for (std::size_t i = 0; i < in.size(); ++i) in[i].d[0] = theta_dot.data()[i];
              map.apply(in.data(), out.data());
              py::array_t<double> result(static_cast<py::ssize_t>(out.size()));
@@ -64,7 +65,7 @@ void bind_map(py::module_& m) {
            })
       .def("theta_bar",
            [](const ParameterMap& map, const Array& theta, const Array& inputs_bar) {
-             expect_size(inputs_bar, map.base.size(), "inputs_bar");
+             expect_size(inputs_bar, map.terms().base.size(), "inputs_bar");
              std::vector<double> out(theta.size());
              map.pull_back(theta.data(), inputs_bar.data(), out.data());
              return to_numpy(out, {static_cast<py::ssize_t>(out.size())});
