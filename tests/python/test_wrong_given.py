@@ -318,7 +318,10 @@ def test_what_a_finer_mesh_explains_is_no_wrong_number(monkeypatch: pytest.Monke
     problem, u = minimum(e)
     told, _ = told_numbers(problem, u)
     assert "stood 4 mm farther along z" in wrong_given(problem, u, told)[0].words[0]
-    assert wrong_given(problem, u, told, sb.Refinement(halve_step=False, finer=finer)) == []
+    beside = sb.Refinement(halve_step=False, finer=finer)
+    (lead,) = wrong_given(problem, u, told, beside)  # what that mesh leaves of the error holds the clamp's stub
+    assert "rope stuck out" in lead.words[0] and lead.explained < 0.3
+    assert wrong_given(problem, u, [one for one in told if one.name != "lead"], beside) == []
 
 
 def test_recordings_are_asked_each_for_its_own_clock() -> None:

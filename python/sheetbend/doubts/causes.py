@@ -76,9 +76,15 @@ def seen_beside(q: Array, tried: Sequence[tuple[Told, Array]]) -> list[tuple[Tol
     return [(one, column, b) for one, column, b in beside if float(b @ b) > RANK_TOLERANCE * float(column @ column)]
 
 
-def causes(r: Array, seen: Sequence[tuple[Told, Array, Array]], left: float, least: float) -> list[Cause]:
+def causes(
+    r: Array, seen: Sequence[tuple[Told, Array, Array]], left: float, least: float, two: bool = False
+) -> list[Cause]:
     """The errors that explain a share `least` of what residuals r, orthogonal to the parameters' directions, hold
-    beyond noise: the likeliest first, and of those that explain `MOST` those about as much. Chance is not asked yet."""
+    beyond noise: the likeliest first, and of those that explain `MOST` those about as much. Chance is not asked yet.
+
+    Args:
+        two: ask for two at once that explain nearly all, where none alone does.
+    """
     found, most = [], 0.0
     for one, column, beside in seen:
         inner, along = float(beside @ beside), float(beside @ r)
@@ -87,16 +93,18 @@ def causes(r: Array, seen: Sequence[tuple[Told, Array, Array]], left: float, lea
             most = max(most, explained)
             if explained > least:
                 found.append(Cause(explained, ((one, -along / inner, column),)))
-    if least == MOST and most < MOST_OF_TWO:
+    if two:
+        found = []
+    if two and most < MOST_OF_TWO:
         shared = [each for each in seen if not each[0].marker]
         pairs = []
         if len(shared) > 1:
             beside = np.column_stack([b for *_, b in shared])
-            for two in two_directions(r, beside, left, most, MOST_OF_TWO):
-                both = [(*shared[k][:2], more) for k, more in zip(two.places, two.more, strict=True)]
+            for pair in two_directions(r, beside, left, most, MOST_OF_TWO):
+                both = [(*shared[k][:2], more) for k, more in zip(pair.places, pair.more, strict=True)]
                 if all(_possible(one, more) for one, _, more in both):
-                    pairs.append(Cause(two.explained, tuple((one, more, column) for one, column, more in both)))
-        found = pairs or found
+                    pairs.append(Cause(pair.explained, tuple((one, more, column) for one, column, more in both)))
+        found = pairs
     found.sort(key=lambda cause: -cause.explained)
     alike = max(ALIKE, BY_CHANCE / left) if least == MOST else np.inf
     return [cause for cause in found if cause.explained > found[0].explained - alike][:MOST_NAMED]

@@ -6,7 +6,7 @@ set of tangents. That of markers, clamps and clocks comes from what the simulate
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -24,6 +24,7 @@ from ..quantities.quantities import Quantity
 from ..recording.recording import Recording
 from ..scene.air import WIND
 from .draft import drafts
+from .lead import Lead, leads
 from .sensor_errors import sensor_errors
 from .tangents import tangents
 from .told_inputs import AXES, STEPS, gravity_turns, told_inputs
@@ -35,6 +36,7 @@ GROUPS: Mapping[str, tuple[str, tuple[float, str]]] = {
     **OF_INPUTS,
     "clamps": ("m", STEPS["m"]),
     "clamp_direction": ("rad", STEPS["rad"]),
+    "lead": ("m", STEPS["m"]),
     "markers": ("m", (STEPS["m"][0], "1 mm each")),
     "recording_clock": ("", (1e-3, "0.1 %")),
     "recording_delay": ("s", STEPS["s"]),
@@ -131,24 +133,32 @@ def _collect(
     blown, moves = drafts(problem, u, i, e.scene.compiled.inputs(own))
     added: dict[str, Any] = {}
     for given in told_inputs(e, own, blown.experiments[i]):
-        one = Told(i, given.name, given.label, given.unit, given.step, _NONE, relative=not given.unit)
-        made.append((1.0, replace(one, missing=given.says, signed=given.says is not None)))
+        one = Told(i, given.name, given.label, given.unit, given.step, _NONE, missing=given.says)
+        made.append((1.0, replace(one, signed=given.says is not None, relative=not (given.unit or given.says))))
         added[given.label] = given.added
     for axis, more in enumerate(moves):
         label = f"{DRAFT} {AXES[axis]}"
         made.append((1.0, Told(i, "draft", label, *GROUPS["draft"], _NONE)))
         added[label] = more
+    lengths = {name: (k, own[place] if log else 1.0) for k, (name, place, log) in enumerate(asked)}
+    stuck_out = [lead for lead in leads(e.scene, e.scene.compiled.inputs(own)) if f"{lead.rope}_length" in lengths]
+    added |= {lead.label: lead.added for lead in stuck_out}
     by_gravity: dict[int, Array] = {}
+    sticking: list[tuple[Lead, Array]] = []
     if made:
         columns = tangents(blown, u, i, added, asked, corrected)
-        for (weight, one), column in zip(made, columns.T, strict=True):
-            yield replace(one, column=weight * column)
+        for (weight, told), column in zip(made, columns.T[: len(made)], strict=True):
+            yield replace(told, column=weight * column)
         by_gravity = {axis: columns[:, len(asked) + n] for n, axis in enumerate(gravity_turns(e))}
+        behind = len(columns.T) - len(stuck_out)
+        for lead, column in zip(stuck_out, columns.T[behind:], strict=True):
+            k, value = lengths[f"{lead.rope}_length"]
+            sticking.append((lead, column + columns[:, k] / value))
     for error in sensor_errors(problem, u, i):
         unit = GROUPS[error.name][0]
         one = Told(i, error.name, error.label, unit, error.step, error.column, relative=not unit)
         yield replace(one, missing=error.says, signed=True)
-    yield from _observe(problem, i, e, r, corrected, own, by_gravity)
+    yield from _observe(problem, i, e, r, corrected, own, by_gravity, sticking)
 
 
 def _step(q: Quantity, value: float, log: bool) -> tuple[bool, float, str] | None:
@@ -172,6 +182,7 @@ def _observe(
     corrected: Array | None,
     theta: Array,
     by_gravity: Mapping[int, Array],
+    sticking: Sequence[tuple[Lead, Array]],
 ) -> Iterator[Told]:
     """Places of markers and clamps, and the clock, from the simulated markers."""
     at, size = e.scene.compiled.layout["position"]
@@ -197,6 +208,12 @@ def _observe(
                 mine = np.zeros(problem.core.first_rows[i + 1] - problem.core.first_rows[i], dtype=bool)
                 mine[own] = marker == m
                 yield replace(whole, label=f"{name} {k}", column=whole.column[marker == m], rows=mine, marker=name)
+    for lead, column in sticking:
+        if lead.from_start and count:
+            farther = np.array([lead.moves(e.scene, place) for place in e.compared_places])
+            column = column.copy()
+            column[own] += change("", "lead", moves[0] * farther[:, None]).column
+        yield Told(i, "lead", lead.label, *GROUPS["lead"], column, missing=lead.says, signed=True)
     for axis in range(3) if count == 1 else ():  # of ropes
         yield change(f"{BESIDE} {AXES[axis]}", "marker_offset", np.cross(moves[0], np.eye(3)[axis]))
     held, boundary = sorted(e.scene.pinned, key=e.scene.places_of), e.scene.boundary

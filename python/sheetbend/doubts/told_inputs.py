@@ -13,6 +13,7 @@ from ..arrays.timeseries import Array
 from ..experiment.experiment import Experiment
 from ..quantities.wording import short
 from .held_directions import held_directions
+from .isotropy import alike
 from .marker_mass import MOST_EACH, marker_load, unseen_mass
 from .tangents import Input
 
@@ -30,6 +31,7 @@ GROUPS: Mapping[str, tuple[str, tuple[float, str]]] = {
     "load_size": ("", PERCENT),
     "start_speed": ("", PERCENT),
     "unnamed": ("", PERCENT),
+    "isotropy": ("", (0.1, "10 %")),
     "marker_mass": ("kg", (MOST_EACH, f"{short(1e3 * MOST_EACH)} g each")),
 }
 """Unit ("" where it is relative) and step, as in `told.GROUPS`."""
@@ -83,6 +85,7 @@ def told_inputs(e: Experiment, theta: Array, loaded: Experiment) -> list[ToldInp
             _loads(loaded, theta),
             _speed(e),
             _unnamed(e),
+            (_made("isotropy", one.label, one.added, one.says) for one in alike(e.scene, inputs)),
             _weights(e, inputs),
         )
         for one in found

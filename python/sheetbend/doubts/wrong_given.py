@@ -146,11 +146,15 @@ def _asked(
 
     def likely(tried: Sequence[tuple[Told, Array]], mine: Array, left: float, least: float) -> list[Cause]:
         white = max((float(r[mine] @ r[mine]) - left) / np.count_nonzero(mine), 1.0)
-        explaining = causes(r, seen_beside(q, tried), left, least)
         chance = partial(of_what_is_left, r, J, mine, layout) if least == MOST else partial(of_noise, q, white)
-        tests = [math.comb(len(tried), len(cause.parts)) * len(groups) for cause in explaining]
-        each = zip(explaining, tests, strict=True)
-        return [cause for cause, n in each if beyond_chance(partial(chance, cause), n, errors)]
+        seen = seen_beside(q, tried)
+        for two in (True, False) if least == MOST else (False,):  # where chance explains a second one, one may do
+            explaining = causes(r, seen, left, least, two)
+            tests = [math.comb(len(tried), len(cause.parts)) * len(groups) for cause in explaining]
+            each = zip(explaining, tests, strict=True)
+            if sure := [cause for cause, n in each if beyond_chance(partial(chance, cause), n, errors)]:
+                return sure
+        return []
 
     for group in groups:
         mine = rows_of(problem, group)

@@ -1,0 +1,75 @@
+"""Stiffnesses that a model takes as alike along two directions, because only one was given: the weft of a cloth as its
+warp, its bending and its twist along the weft, and the second bending stiffness of a rod.
+
+Each stands in the inputs as the root of its ratio to the first one, a plain number. On a motion that shows the soft
+direction alone, a fit of one number for both takes the soft one for both, and leaves hardly more than noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays.timeseries import Array
+from ..objects.chain import first_value
+from ..objects.rod import Rod
+from ..quantities.wording import short
+from ..scene.scene import Scene
+from .tangents import Input
+
+
+@dataclass(frozen=True)
+class Alike:
+    """A ratio of two stiffnesses that is taken as given.
+
+    Attributes:
+        label: what over what.
+        added: what the ratio's logarithm adds to inputs.
+        says: a size of it, in words.
+    """
+
+    label: str
+    added: Input
+    says: Callable[[float], str]
+
+
+_OF_CLOTH = (
+    ("_membrane", 5, "weft", "warp"),
+    ("_bend", 9, "bending_weft", "bending"),
+    ("_bend", 10, "bending_twist", "bending"),
+)
+
+
+def alike(scene: Scene, inputs: Array) -> Iterator[Alike]:
+    """The ratios of a scene that no quantity changes.
+
+    Args:
+        inputs: of the scene.
+    """
+    for cloth in scene.cloths.values():
+        for group, place, second, first in _OF_CLOTH:
+            yield from _ratio(scene, inputs, cloth.name, cloth.name + group, place, second, first, cloth.fabric)
+    for rope in scene.ropes.values():
+        if isinstance(rope, Rod):
+            yield from _ratio(scene, inputs, rope.name, f"{rope.name}_bend", 0, "EI2", "EI", rope.name)
+
+
+def _ratio(
+    scene: Scene, inputs: Array, name: str, group: str, place: int, second: str, first: str, prefix: str
+) -> Iterator[Alike]:
+    known = {g.name: g for g in scene.groups}
+    if f"{prefix}_{second}" in scene.quantities or f"{prefix}_{first}" not in scene.quantities or group not in known:
+        return
+    count, width = known[group].rest.shape
+    if place >= width:
+        return
+    at = first_value(scene, group) + width * np.arange(count) + place
+    values = inputs[scene.compiled.layout["rest"][0] + at]
+
+    def says(size: float) -> str:
+        how = "stiffer" if size > 0 else "softer"
+        return f"{second} of {name} were {short(100 * abs(np.expm1(size)), 2)} % {how} than its {first} ({second})"
+
+    yield Alike(f"{prefix}_{second} over {first}", ("rest", at, 0.5 * values), says)
