@@ -8,6 +8,7 @@ from functools import cache
 
 import contact_cases as contact
 import numpy as np
+import population_cases as many
 import sheetbend as sb
 from sheetbend import textile
 from sheetbend.experiment.wanted import as_parameters
@@ -179,6 +180,7 @@ CASES: Mapping[str, Case] = {
     ),
     "cloth": Case("cloth, white noise", CLOTH, of_motion(cloth, 4, lambda: seen(cloth(4)), CLOTH)),
     "pull": Case("pulls of five specimens, white noise", PULL, pull),
+    "population": Case("50 ropes with a spread of 10 %", many.TRUTH, many.fit_population, least=180, most=200),
     "contact_drag": Case(
         "rope dragged over a table", contact.DRAG, contact.twin(contact.drag, contact.DRAG), least=180, most=200
     ),
