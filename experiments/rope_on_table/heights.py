@@ -4,7 +4,7 @@
 
 Each node lands by itself, so the loss has a kink wherever one lands a substep earlier, or begins or ends to slide. The
 script prints, for windows of heights, the mean of the gradient beside the slope of the loss over the window, and draws
-both, with both integrators.
+both, with both integrators and, with the second one, also of a damped rope.
 """
 
 from __future__ import annotations
@@ -21,24 +21,38 @@ import sheetbend as sb
 HEIGHTS = np.linspace(0.04, 0.0402, 41)  # m
 WINDOW = 20  # heights
 FRAMES = np.linspace(0.0, 0.4, 21)  # s
+LEANING = np.array([1.0, 0.0, 0.4]) / np.hypot(1.0, 0.4)
+THROWN = (0.3, 0.1, 0.0)  # m/s
+DAMPED = 0.02  # s
 Array = np.ndarray
 
 
-def falling(height: float) -> tuple[sb.Scene, Array]:
-    """A rope that leans and flies along itself, with its lowest point at a height; and its particles."""
-    scene = sb.rope(
-        0.3, 12, density=0.05, EA=200.0, EI=1e-4, start=(0, 0, height), direction=(1.0, 0.0, 0.4), pinned=()
+def falling(height: float, damping: float = 0.0) -> tuple[sb.Scene, Array]:
+    """A rope that leans and flies along itself, with its lowest point at a height; and its particles. The time constant
+    of damping [s] is that of stretching and of bending."""
+    scene = sb.Scene("rope on a table")
+    line = np.array([0.0, 0.0, height]) + np.outer(np.linspace(0.0, 0.3, 13), LEANING)
+    damped = {"stretch_damping": damping, "bend_damping": damping} if damping else {}
+    rope = sb.add_rope(
+        scene,
+        "rope",
+        length=0.3,
+        segments=12,
+        points=line,
+        velocity=np.tile(THROWN, (13, 1)),
+        density=0.05,
+        EA=200.0,
+        EI=1e-4,
+        **damped,
     )
-    rope = scene.ropes["rope"].particles
-    scene._velocities.values[rope] = (0.3, 0.1, 0.0)
     scene.add_contact(rope, sb.Plane(name="table"), friction=0.3, radius=0.004)
-    return scene, rope
+    return scene, rope.particles
 
 
-def loss_and_slope(height: float, solver: sb.Solver) -> tuple[float, float]:
+def loss_and_slope(height: float, solver: sb.Solver, damping: float = 0.0) -> tuple[float, float]:
     """Mean squared distance of the rope's particles from the origin over the frames [m^2], and its derivative with
     respect to the height by the adjoint [m]."""
-    scene, rope = falling(height)
+    scene, rope = falling(height, damping)
     rollout = sb.rollout(scene, FRAMES, solver)
     x = rollout.positions[:, rope]
     bar = np.zeros_like(rollout.positions)
@@ -47,22 +61,31 @@ def loss_and_slope(height: float, solver: sb.Solver) -> tuple[float, float]:
     return float((x**2).sum(axis=2).mean()), float(gradient[rope, 2].sum())
 
 
-def print_windows(name: str, losses: Array, slopes: Array) -> None:
-    print(f"{name}: heights [mm]      slope of the loss   mean gradient   off")
+def windows(losses: Array, slopes: Array) -> list[tuple[float, float]]:
+    """The slope of the loss over each window of heights, and the mean of the gradient."""
+    found = []
     for first in range(0, len(HEIGHTS) - 1, WINDOW):
         last = first + WINDOW
         width = HEIGHTS[last] - HEIGHTS[first]
-        between = (losses[last] - losses[first]) / width
-        own = np.trapezoid(slopes[first : last + 1], HEIGHTS[first : last + 1]) / width
-        ends = f"{1e3 * HEIGHTS[first]:.2f} to {1e3 * HEIGHTS[last]:.2f}"
+        mean = np.trapezoid(slopes[first : last + 1], HEIGHTS[first : last + 1]) / width
+        found.append(((losses[last] - losses[first]) / width, mean))
+    return found
+
+
+def print_windows(name: str, losses: Array, slopes: Array) -> None:
+    print(f"{name}: heights [mm]      slope of the loss   mean gradient   off")
+    for first, (between, own) in zip(HEIGHTS[::WINDOW], windows(losses, slopes), strict=False):
+        ends = f"{1e3 * first:.2f} to {1e3 * (first + WINDOW * (HEIGHTS[1] - HEIGHTS[0])):.2f}"
         print(f"{name}: {ends}  {between:17.4f} {own:15.4f}   {100 * (own / between - 1):+.1f} %", flush=True)
 
 
 def main(picture: str) -> None:
-    figure, axes = plt.subplots(2, 2, figsize=(8, 5), sharex=True, sharey="row", layout="constrained")
-    for (top, bottom), name in zip(axes.T, ("bdf1", "bdf2"), strict=True):
-        solver = sb.Solver(h=1e-3, method="implicit", integrator=name)
-        losses, slopes = np.array([loss_and_slope(height, solver) for height in HEIGHTS]).T
+    figure, axes = plt.subplots(2, 3, figsize=(11, 5), sharex=True, sharey="row", layout="constrained")
+    runs = (("bdf1", 0.0), ("bdf2", 0.0), ("bdf2", DAMPED))
+    for (top, bottom), (integrator, damping) in zip(axes.T, runs, strict=True):
+        solver = sb.Solver(h=1e-3, method="implicit", integrator=integrator)
+        name = integrator + (", damped" if damping else "")
+        losses, slopes = np.array([loss_and_slope(height, solver, damping) for height in HEIGHTS]).T
         print_windows(name, losses, slopes)
         mm = 1e3 * HEIGHTS
         top.plot(mm, 1e6 * (losses - losses[0]), ".-", markersize=4, linewidth=0.8)
