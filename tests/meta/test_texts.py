@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
 import re
+import shlex
 import subprocess
 import sys
 import tomllib
@@ -85,6 +88,45 @@ def test_code_in_the_texts_runs(block: str, tmp_path: Path, monkeypatch: pytest.
         small = ["--ropes", "2", "--train", "2", "--eval", "1", "--seconds", "0.5"]
         subprocess.run([sys.executable, "experiments/gripped_ropes/make_data.py", ".", *small], check=True)
     exec(compile(block, "README", "exec"), {"__name__": "readme"})
+
+
+@pytest.mark.parametrize("block", blocks("py"))
+def test_code_that_needs_data_of_the_reader_uses_names_that_exist(block: str) -> None:
+    """Blocks that are marked `py` cannot run here: they stand on a reader's own recording, or on an extra."""
+    used = [node for node in ast.walk(ast.parse(block)) if isinstance(node, ast.Attribute)]
+    assert [
+        n.attr for n in used if isinstance(n.value, ast.Name) and n.value.id == "sb" and not hasattr(sb, n.attr)
+    ] == []
+    calls = [node for node in ast.walk(ast.parse(block)) if isinstance(node, ast.Call)]
+    for call in calls:
+        if (
+            isinstance(call.func, ast.Attribute)
+            and isinstance(call.func.value, ast.Name)
+            and call.func.value.id == "sb"
+        ):
+            takes = inspect.signature(getattr(sb, call.func.attr)).parameters
+            every = any(p.kind is p.VAR_KEYWORD for p in takes.values())
+            assert every or [k.arg for k in call.keywords if k.arg is not None and k.arg not in takes] == []
+
+
+def commands() -> list[object]:
+    """Every line of a block of shell commands that calls the command line."""
+    return [
+        pytest.param(line, id=f"{text.relative_to(ROOT)}: {' '.join(line.split()[:4])}")
+        for text in TEXTS
+        for block in re.findall(r"```sh\n(.*?)```", text.read_text(), re.S)
+        for line in block.replace("\\\n", " ").splitlines()
+        if line.startswith("sheetbend ")
+    ]
+
+
+@pytest.mark.parametrize("line", commands())
+def test_commands_in_the_texts_are_understood(line: str) -> None:
+    """Their options and arguments exist; what they do is for the tests of each command."""
+    typer = pytest.importorskip("typer")
+    command = typer.main.get_command(pytest.importorskip("sheetbend.cli.app").app)
+    _, name, *arguments = shlex.split(line, comments=True)
+    command.commands[name].make_context(name, arguments)  # refuses what it does not know
 
 
 @pytest.mark.parametrize("block", blocks("toml"))

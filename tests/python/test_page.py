@@ -214,6 +214,12 @@ class TestMotionPage:
         assert len(own) < 0.2 * len(page)
         assert not re.search(r"https?://|\bsrc=|<link|@import|url\(|fetch\(|XMLHttpRequest|import\(", own)
 
+    def test_the_surface_of_a_solid_is_called_one(self) -> None:
+        scene = sb.solid(sb.mesh.bricks((0.1, 0.1, 0.1), (1, 1, 1)), name="block", density=1e3, E=1e6, poisson=0.3)
+        motion = sb.simulate(scene, [0.0, 1e-3], sb.Solver(h=1e-3, method="newton"))
+        (drawn,) = packed_motions([of_trajectory(scene, motion)])
+        assert [sheet["kind"] for sheet in drawn["sheets"]] == ["solid"]
+
     def test_points_of_a_cloud_are_marked_as_such(self) -> None:
         """Curves of one point over time, which is another one in every frame, were drawn."""
         cloud = sb.Cloud.of([np.zeros((3, 3)), np.ones((3, 3))], [0.0, 0.1])

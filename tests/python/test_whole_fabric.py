@@ -146,6 +146,10 @@ def test_the_page_has_what_the_report_has(folder: Path, told: dict[str, object])
         ("[[bending]]\nbending_length = [24.9, 25.0, 25.1]", "[[bending]]", "give files or bending_length"),
         ("warp0.csv", "none.csv", "none.csv"),
         ('length = "20cm"', 'length = "20 turns"', "length"),
+        ('length = "20cm"', "length = 200", 'pull[0].length: must be a text in "quotes" (got 200)'),
+        ('length = "20cm"', "length = 200", 'with its unit: "20cm"'),
+        ("[24.9, 25.0, 25.1]", "[2.49, 2.5, 2.51]", "give mm, such as [24.9, 25.0, 25.1] for cm"),
+        ("[199, 200, 201]", "[0.2, 0.201]", "give g/m^2, such as [200.0, 201.0] for kg/m^2"),
     ],
 )
 def test_bad_files_of_tests(folder: Path, old: str, new: str, words: str) -> None:
@@ -154,6 +158,14 @@ def test_bad_files_of_tests(folder: Path, old: str, new: str, words: str) -> Non
     (folder / "bad.toml").write_text(text.replace(old, new))
     done = run(folder / "bad.toml", "--output", str(folder / "bad"))
     assert done.exit_code == 2 and words in " ".join(done.output.split()), done.output
+
+
+@pytest.mark.parametrize(("name", "first"), [("a.xlsx", b"PK\x03\x04\x14"), ("a.xls", b"\xd0\xcf\x11\xe0\xa1")])
+def test_workbooks_are_refused_by_their_name(tmp_path: Path, name: str, first: bytes) -> None:
+    """They were called text without a table of numbers."""
+    (tmp_path / name).write_bytes(first + bytes(100))
+    with pytest.raises(RecordingError, match=r"is a workbook of a spreadsheet.*save the sheet"):
+        textile.read_curves(tmp_path / name)
 
 
 class TestLaw:

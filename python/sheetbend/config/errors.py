@@ -68,6 +68,10 @@ def one(detail: Mapping[str, Any], model: type[BaseModel]) -> ConfigError:
         return ConfigError(field, "must be a list of tables", _short(got), f"write [[{header}]] in place of [{header}]")
     if kind == "list_type" and isinstance(got, int | float | str) and not isinstance(got, bool):
         return ConfigError(field, "must be a list in [brackets]", got, f"write {path[-1]} = [{_toml(got)}]")
+    if kind == "string_type" and isinstance(got, int | float):
+        told = re.search(r'"[^"]*\d[^"]*"', _described(path, model))
+        fix = 'put it in "quotes"' + (f", with its unit: {told[0]}" if told else "")
+        return ConfigError(field, f"must be {wanted}", got, fix)
     if kind in ("float_type", "int_type") and isinstance(got, str):
         quotient = _quotient(got)
         fix = f"write {got.strip()} without quotes" if _is_number(got) else f"write {wanted}, without quotes and unit"
@@ -246,10 +250,7 @@ def _annotation(path: Location, model: type[BaseModel]) -> Any:
 
 def _numbers(path: Location, model: type[BaseModel]) -> tuple[int, str] | None:
     """How many numbers the list of a key must have, with an example; None where that is free."""
-    if not path or isinstance(path[-1], int):
-        return None
-    owners = _options(_annotation(path[:-1], model))
-    owner = next((o for o in owners if isinstance(o, type) and issubclass(o, BaseModel)), None)
+    owner = _owner(path, model)
     if owner is None:
         return None
     shape = owner.model_json_schema()["properties"].get(path[-1], {})
@@ -257,9 +258,24 @@ def _numbers(path: Location, model: type[BaseModel]) -> tuple[int, str] | None:
     lengths = {s.get("minItems") for s in kinds if s.get("minItems") == s.get("maxItems", -1)}
     if len(lengths) != 1 or not lengths <= set(_EXAMPLES):
         return None
-    told = re.match(r"\[[^\]]+\]", str(shape.get("description", "")))
+    told = re.match(r"\[[^\]]+\]", _described(path, model))
     count = lengths.pop()
     return count, told[0] if told else _EXAMPLES[count]
+
+
+def _owner(path: Location, model: type[BaseModel]) -> type[BaseModel] | None:
+    """The section that a key belongs to; None of an entry of a list."""
+    if not path or isinstance(path[-1], int):
+        return None
+    owners = _options(_annotation(path[:-1], model))
+    return next((o for o in owners if isinstance(o, type) and issubclass(o, BaseModel)), None)
+
+
+def _described(path: Location, model: type[BaseModel]) -> str:
+    """What a key means."""
+    owner = _owner(path, model)
+    field = None if owner is None else owner.model_fields.get(str(path[-1]))
+    return "" if field is None else field.description or ""
 
 
 def _short(got: Any) -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from ..files.units import Length
 from ..textile.drape import Plates
@@ -14,6 +14,10 @@ Positive = Annotated[Finite, Field(gt=0)]
 Values = Annotated[list[Positive], Field(min_length=1)]
 Files = Annotated[list[str], Field(min_length=1)]
 Along = Literal["warp", "weft"]
+
+
+LIGHTEST, LIMPEST = 2.0, 4.0
+"""g/m^2 and mm, of any fabric: less is in another unit."""
 
 
 class FabricSection(Section):
@@ -30,6 +34,14 @@ class Weight(Section):
     """[weight]: weighed pieces."""
 
     specimens: Values = key(..., "weight per area of each", "g/m^2")
+
+    @field_validator("specimens")
+    @classmethod
+    def _of_fabrics(cls, given: list[float]) -> list[float]:
+        if min(given) < LIGHTEST:
+            kilograms = f"such as {[float(f'{1e3 * g:.6g}') for g in given]} for kg/m^2"
+            raise ValueError(f"are lighter than any fabric, {LIGHTEST:g} g/m^2|give g/m^2, {kilograms}")
+        return given
 
 
 class Machine(Section):
@@ -71,6 +83,14 @@ class BendingTest(Machine):
 
     along: Along = key("warp", "direction of the strips")
     bending_length: Values | None = key(None, "of each specimen, by the cantilever test (ASTM D1388, FAST-2)", "mm")
+
+    @field_validator("bending_length")
+    @classmethod
+    def _of_fabrics(cls, given: list[float] | None) -> list[float] | None:
+        if given is not None and min(given) < LIMPEST:
+            centimeters = f"such as {[float(f'{10 * g:.6g}') for g in given]} for cm"
+            raise ValueError(f"are shorter than those of any fabric, {LIMPEST:g} mm|give mm, {centimeters}")
+        return given
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:

@@ -133,4 +133,6 @@ def _at(field: str) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        raise ConfigError(f"{field}: {error.field}", error.problem, error.got, error.fix) from error
+        own = {"path": "files"}.get(error.field, error.field)
+        named = f"{field}.{own}" if own in Pull.model_fields else f"{field}: {own}"
+        raise ConfigError(named, error.problem, error.got, error.fix) from error

@@ -40,7 +40,7 @@ def no_minimum(problem: FitProblem, end: Minimum) -> str:
         left = promised(problem, end.u)
         stopped = "interrupted" if end.interrupted else "the optimizer stopped"
         if left > FAR and not _rounding(left * end.cost, end):
-            return f"{stopped} where a step still promises {short(100 * left, 2)} % less"
+            return f"{stopped} early: its next step would lower the cost by {short(100 * left, 2)} %"
     if above_start(end):
         return f"the fit ended at {short(end.cost / (end.first or 1.0), 2)} times the cost of its own start"
     if not end.converged:

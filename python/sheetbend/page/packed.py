@@ -83,6 +83,7 @@ def _sheet(name: str, sheet: Sheet, frames: Array, places: str | None) -> dict[s
     shades = np.clip(np.nan_to_num(strain) / (largest or 1.0), 0.0, 1.0) * _SHADES
     return {
         "name": name,
+        "kind": sheet.kind,
         "nodes": sheet.positions.shape[1],
         "triangles": _base64(sheet.triangles.astype("<u4")),
         "places": places,

@@ -26,11 +26,12 @@ TICK = 0.02  # of the motion's extent: length of the mark that shows how a rod i
 @dataclass(frozen=True)
 class Sheet:
     """A cloth: triangles (m, 3) of its vertices, their positions (frames, vertices, 3) m, and each triangle's largest
-    strain (frames, m), 1."""
+    strain (frames, m), 1; `kind` is what the legend calls it, "cloth" or "solid"."""
 
     triangles: Array
     positions: Array
     strain: Array
+    kind: str = "cloth"
 
 
 @dataclass(frozen=True)
@@ -122,7 +123,10 @@ def of_recording(recording: Recording, name: str) -> Shown:
 
 def _shown(name: str, scene: Scene, times: Array, positions: Array, recorded: Mapping[str, object]) -> Shown:
     lines = {rope.name: positions[:, rope.particles] for rope in scene.ropes.values()}
-    sheets = {c.name: _sheet(c.mesh, positions[:, c.particles]) for c in scene.sheets}
+    sheets = {
+        c.name: _sheet(c.mesh, positions[:, c.particles], "solid" if c.name in scene.solids else "cloth")
+        for c in scene.sheets
+    }
     boxes = body_lines(scene, positions)
     if not lines and not sheets and not boxes:  # a scene of bare particles and constraints: its links
         lines = _links(scene, positions)
@@ -132,8 +136,8 @@ def _shown(name: str, scene: Scene, times: Array, positions: Array, recorded: Ma
     return Shown(name, times, lines, kind, ticks, sheets, up=up, **recorded)  # type: ignore[arg-type]
 
 
-def _sheet(mesh: TriangleMesh, positions: Array) -> Sheet:
-    return Sheet(mesh.triangles, positions, np.stack([largest_strain(mesh, x) for x in positions]))
+def _sheet(mesh: TriangleMesh, positions: Array, kind: str) -> Sheet:
+    return Sheet(mesh.triangles, positions, np.stack([largest_strain(mesh, x) for x in positions]), kind)
 
 
 def _links(scene: Scene, positions: Array) -> dict[str, Array]:

@@ -99,11 +99,17 @@ def _told(path: Path, tables: Sequence[TextTable], field: str, words: str) -> fl
             told = [u for u in (unit(match[1]), unit(match[3])) if u and u.dimension == "length"] if match else []
             if match is None or not told:
                 raise RecordingError(
-                    f"{path}, line {line}", f"holds no {field} with its unit", text, f"give {field}=, m"
+                    f"{path}, line {line}",
+                    f"holds no {field} with its unit",
+                    text,
+                    f"give the {field} itself, such as 20cm",
                 )
             return table.number(line, 0, match[2]) * told[0].factor
     raise RecordingError(
-        str(path), f"has no line above its tables that starts with {words!r}", field, f"give {field}=, m"
+        str(path),
+        f"has no line above its tables that starts with {words!r}",
+        field,
+        f"give the {field} itself, such as 20cm",
     )
 
 
@@ -142,7 +148,7 @@ def _deformation(column: Column, allowed: Sequence[str], test: str, length: floa
     if column.unit is None or column.unit.dimension != "length":
         return values * factor, lines
     if length is None:
-        fix = "give the length between the jaws, m, or the preamble's words for it"
+        fix = "give the length between the jaws, such as 20cm, or the words before it in the file's first lines"
         raise InputError("length", "is missing, and the deformation is a length", column.unit.text, fix)
     share = values * factor / length
     return np.arctan(share) if test == "shear" else share, lines
@@ -154,6 +160,6 @@ def _load(column: Column, allowed: Sequence[str], width: float | None) -> Array:
     if column.unit is None or column.unit.dimension.endswith("per width"):
         return values * factor
     if width is None:
-        fix = "give the specimen's width, m, or the preamble's words for it"
+        fix = "give the specimen's width, such as 5cm, or the words before it in the file's first lines"
         raise InputError("width", "is missing, and the load is not per width", column.unit.text, fix)
     return values * factor / width

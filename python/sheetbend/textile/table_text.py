@@ -106,10 +106,17 @@ def read_tables(path: Path, decimal: str | None = None) -> list[TextTable]:
     return _tables(path, split[delimiter], mark, delimiter)
 
 
+_ZIP, _OLE = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
+"""How .xlsx and .ods, and .xls begin."""
+
+
 def _text(path: Path) -> str:
     if not path.is_file():
         raise RecordingError("path", "is no file", str(path), "check the path")
     data = bounded_bytes(path, LARGEST)
+    if data[: len(_ZIP)] == _ZIP or data[: len(_OLE)] == _OLE:
+        fix = "save the sheet with the curves as CSV, any separator and decimal mark"
+        raise RecordingError(str(path), "is a workbook of a spreadsheet, not text", path.name, fix)
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return data.decode("utf-16", errors="replace")
     try:

@@ -205,7 +205,7 @@ class Space {
       position.needsUpdate = tint.needsUpdate = true;
       geometry.computeVertexNormals();
     };
-    return { name: "cloth", tone: "accent", object: mesh, at };
+    return { name: part.kind, tone: "accent", object: mesh, at };
   }
 
   draw(frame) {
