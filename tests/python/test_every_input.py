@@ -90,7 +90,7 @@ def swung() -> sb.Scene:
     scene.add_point_mass(8, 0.01, "knot")
     scene.add_force([8], np.tile([[[0.0, 0.1, 0.0]]], (len(KNOTS), 1, 1)), KNOTS)
     table = sb.Plane((0.0, 0.0, 0.5), (0.0, 0.0, 1.0), name="table")
-    scene.contact(scene.ropes["rope"], table, friction=0.3, radius=0.005, stiffness=1e3, dissipation=0.1)
+    scene.add_contact(scene.ropes["rope"], table, friction=0.3, radius=0.005, stiffness=1e3, dissipation=0.1)
     return scene
 
 
@@ -137,9 +137,9 @@ def dropped() -> sb.Scene:
     scene = sb.rope(0.1, 3, density=0.05, EI=1e-3, points=[[0, 0, 0.1], [0.1, 0, 0.1]], pinned=())
     floor = sb.Plane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), name="floor")
     ball = sb.Sphere((0.0, 0.0, -0.5), 0.5, name="ball")
-    scene.contact(scene.ropes["rope"], ball, friction=0.3, radius=0.01, restitution=0.5)
+    scene.add_contact(scene.ropes["rope"], ball, friction=0.3, radius=0.01, restitution=0.5)
     body = scene.add_body("block", mass=0.1, inertia=[1e-3, 1e-3, 1.5e-3], at=(1, 0, 0.3))
-    scene.contact(body, floor, friction=0.3, points=[[0.1, 0, 0], [-0.1, 0, 0]], name="corners")
+    scene.add_contact(body, floor, friction=0.3, points=[[0.1, 0, 0], [-0.1, 0, 0]], name="corners")
     return scene
 
 
