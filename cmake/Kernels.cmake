@@ -1,5 +1,5 @@
 # The kernels, once per instruction set; core/packs/choose.cpp takes one of them at run time. Per set there are the tables (kernel_table.cpp in
-# core/points, core/blocks, adjoint/packs and adjoint/blocks), and for every kind of constraint in core/constraints/registry.h one unit with its kernels in colors and
+# core/points, core/blocks, adjoint/packs, adjoint/blocks and adjoint/contact), and for every kind of constraint in core/constraints/registry.h one unit with its kernels in colors and
 # one with those in blocks. These units are written here.
 # Renaming the namespace keeps the variants' templates and inline functions apart.
 set(variants portable)
@@ -9,7 +9,7 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   # Sanitizers need minutes per instruction set: there is one.
   if(NOT SHEETBEND_SANITIZE AND NOT SHEETBEND_PORTABLE_KERNELS)
     list(APPEND variants v3 v4)
-    set_source_files_properties(core/packs/choose.cpp PROPERTIES COMPILE_DEFINITIONS SHEETBEND_X86_KERNELS)
+    set_source_files_properties(core/packs/choose.cpp core/solver/packed_contacts.cpp PROPERTIES COMPILE_DEFINITIONS SHEETBEND_X86_KERNELS)
   endif()
 endif()
 
@@ -127,7 +127,7 @@ function(sheetbend_add_kernels variant part)
   set(kernel_libraries ${kernel_libraries} ${library} PARENT_SCOPE)
 endfunction()
 
-set(tables adjoint/packs/kernel_table.cpp adjoint/blocks/kernel_table.cpp core/blocks/kernel_table.cpp core/points/kernel_table.cpp)
+set(tables adjoint/packs/kernel_table.cpp adjoint/blocks/kernel_table.cpp adjoint/contact/kernel_table.cpp core/blocks/kernel_table.cpp core/points/kernel_table.cpp)
 set_source_files_properties(${tables} PROPERTIES SKIP_PRECOMPILE_HEADERS ON)  # they would compile the kernels of every kind
 foreach(variant IN LISTS variants)
   if(variant STREQUAL "v4")

@@ -1,76 +1,71 @@
-// The reverse of a touch (core/contact/touch.h) and of a pose, over duals with a direction for each number that the law reads. Cotangents of
-// ContactNumbers and of Pose stand in objects of the same types.
+// The reverse of a touch (core/contact/touch.h) and of a pose. Cotangents of ContactNumbers and of Pose stand in objects of the same types.
 #pragma once
 
+#include "adjoint/contact/law_vjp.h"
 #include "core/contact/pose.h"
 #include "core/contact/touch.h"
 
 namespace sheetbend {
 
-// Adds to the cotangents of the numbers and returns that of z, given those of the force and of its tangential part.
-template <class S>
-Vec3<S> touch_vjp(const AnyShape& shape, const Vec3<S>& z, const ContactNumbers<S>& c, const Vec3<S>& force_bar,
-                  const Vec3<S>& tangential_bar, ContactNumbers<S>& bar) {
-  using D = Dual<S, 13 + most_sizes>;
-  int next = 0;
-  const auto direct = [&](const S& a) {
-    D d(a);
-    d.d[next++] = S(1.0);
-    return d;
-  };
-  const auto direct_vector = [&](const Vec3<S>& v) {
-    const D x = direct(v.x), y = direct(v.y), w = direct(v.z);
-    return Vec3<D>(x, y, w);
-  };
-  const Vec3<D> zd = direct_vector(z);
-  ContactNumbers<D> cd;
-  cd.from = direct_vector(c.from);
-  cd.carried = direct_vector(c.carried);
-  cd.friction = direct(c.friction);
-  cd.radius = direct(c.radius);
-  cd.kappa = direct(c.kappa);
-  cd.loss = direct(c.loss);
-  cd.dissipates = c.dissipates;
-  for (int k = 0; k < most_sizes; ++k) cd.size[k] = direct(c.size[k]);
-  cd.lift = D(c.lift);
-  cd.firm = c.firm;
-  const Touch<D> t = touch(shape, zd, cd);
-  if (!t.pushes) return {S(0.0), S(0.0), S(0.0)};
-  next = 0;
-  const auto back = [&] {
-    const int i = next++;
-    return force_bar.x * t.force.x.d[i] + force_bar.y * t.force.y.d[i] + force_bar.z * t.force.z.d[i] +
-           tangential_bar.x * t.tangential.x.d[i] + tangential_bar.y * t.tangential.y.d[i] +
-           tangential_bar.z * t.tangential.z.d[i];
-  };
-  const auto back_vector = [&] {
-    const S x = back(), y = back(), w = back();
-    return Vec3<S>(x, y, w);
-  };
-  const Vec3<S> z_bar = back_vector();
-  bar.from = bar.from + back_vector();
-  bar.carried = bar.carried + back_vector();
-  bar.friction += back();
-  const S nearer = back();
-  bar.radius += nearer;
-  bar.lift += nearer;
-  bar.kappa += back();
-  bar.loss += back();
-  for (int k = 0; k < most_sizes; ++k) bar.size[k] += back();
-  return z_bar;
+// Adds to the cotangents of a shape's lengths and returns that of z, given those of the distance there and of its gradient n. The derivative of n is symmetric,
+// so that one direction, along n_bar, takes it back.
+template <class Shape, class S>
+Vec3<S> distance_vjp(const Shape& shape, const Vec3<S>& z, const S* size, const S& distance_bar, const Vec3<S>& n_bar,
+                     S* size_bar) {
+  constexpr int sizes = sizes_of<Shape>;
+  using D = Dual<S, 1 + sizes>;
+  D at[3] = {D(z.x), D(z.y), D(z.z)}, lengths[most_sizes], distance, n[3];
+  at[0].d[0] = n_bar.x, at[1].d[0] = n_bar.y, at[2].d[0] = n_bar.z;
+  for (int k = 0; k < sizes; ++k) lengths[k] = D(size[k]), lengths[k].d[1 + k] = S(1.0);
+  distance_from(shape, at, lengths, distance, n);
+  for (int k = 0; k < sizes; ++k)
+    size_bar[k] +=
+        distance_bar * distance.d[1 + k] + n_bar.x * n[0].d[1 + k] + n_bar.y * n[1].d[1 + k] + n_bar.z * n[2].d[1 + k];
+  return {distance_bar * n[0].v + n[0].d[0], distance_bar * n[1].v + n[1].d[0], distance_bar * n[2].v + n[2].d[0]};
 }
 
-// Adds to the cotangents of a shape's lengths and returns that of z, given that of the normal there.
+// Reverse of unit_normal: returns the cotangent of n.
+template <class Shape, class S>
+Vec3<S> unit_normal_vjp(const Shape& shape, const Vec3<S>& n, const Vec3<S>& bar) {
+  if (!shape.grid) return bar;
+  const Vec3<S> unit = unit_normal(shape, n);
+  return inverse_or_zero(norm(n)) * (bar - dot(unit, bar) * unit);
+}
+
+// Adds to the cotangents of the numbers and returns that of z, given those of the force and of its tangential part.
+template <class Shape, class S>
+Vec3<S> touch_vjp(const Shape& shape, const Vec3<S>& z, const ContactNumbers<S>& c, const Vec3<S>& force_bar,
+                  const Vec3<S>& tangential_bar, ContactNumbers<S>& bar) {
+  S at[3], distance, gradient[3];
+  z.store(at);
+  distance_from(shape, at, c.size, distance, gradient);
+  const Vec3<S> n(gradient), unit = unit_normal(shape, n);
+  const Touch<S> t = touch(shape, distance, n, z, c);
+  if (!any(t.pushes)) return {S(0.0), S(0.0), S(0.0)};
+  const S firm(c.firm), steep = shape.grid ? norm(n) : S(1.0);
+  const auto law = contact_force_vjp(firm * (distance - c.radius - c.lift), unit, z - c.from, c.carried,
+                                     shape.grid ? steep * c.friction : c.friction, c.kappa,
+                                     c.dissipates ? &c.loss : nullptr, dot(n, force_bar), tangential_bar + force_bar);
+  Vec3<S> n_bar = t.normal * force_bar + unit_normal_vjp(shape, n, law.n);
+  if (shape.grid) n_bar = n_bar + (law.friction * c.friction) * unit;
+  const S distance_bar = firm * law.gap;
+  bar.from = bar.from - law.slip;
+  bar.carried = bar.carried + law.carried;
+  bar.friction += steep * law.friction;
+  bar.radius -= distance_bar;
+  bar.lift -= distance_bar;
+  bar.kappa += law.kappa;
+  bar.loss += law.loss;
+  return law.slip + distance_vjp(shape, z, c.size, distance_bar, n_bar, bar.size);
+}
+
+// Adds to the cotangents of a shape's lengths and returns that of z, given that of the unit normal there.
 template <class S>
-Vec3<S> normal_vjp(const AnyShape& shape, const Vec3<S>& z, const S* size, const Vec3<S>& n_bar, S* size_bar) {
-  using D = Dual<S, 3 + most_sizes>;
-  D at[3] = {D(z.x), D(z.y), D(z.z)}, lengths[most_sizes];
-  for (int d = 0; d < 3; ++d) at[d].d[d] = S(1.0);
-  for (int k = 0; k < most_sizes; ++k) lengths[k] = D(size[k]), lengths[k].d[3 + k] = S(1.0);
-  const Vec3<D> n = normal_at(shape, Vec3<D>(at), lengths);
-  const auto back = [&](int i) { return n_bar.x * n.x.d[i] + n_bar.y * n.y.d[i] + n_bar.z * n.z.d[i]; };
-  for (int k = 0; k < most_sizes; ++k) size_bar[k] += back(3 + k);
-  return {back(0), back(1), back(2)};
+Vec3<S> normal_vjp(const AnyShape& shape, const Vec3<S>& z, const S* size, const Vec3<S>& bar, S* size_bar) {
+  S at[3], distance, n[3];
+  z.store(at);
+  distance_from(shape, at, size, distance, n);
+  return distance_vjp(shape, z, size, S(0.0), unit_normal_vjp(shape, Vec3<S>(n), bar), size_bar);
 }
 
 // Compiled once (contact_vjp.cpp), for scenes by themselves and in lanes.
@@ -119,8 +114,8 @@ Vec3<S> turn_by_vjp(const Vec3<S>& r, const S* turn_bar) {
 
 // Reverse of a contact's force on a point at x, both in the world's frame: adds to the cotangents of the numbers and of the pose, and returns that of x.
 // `at` is the touch there.
-template <class S>
-Vec3<S> push_vjp(const AnyShape& shape, const Pose<S>& pose, const Vec3<S>& x, const ContactNumbers<S>& numbers,
+template <class Shape, class S>
+Vec3<S> push_vjp(const Shape& shape, const Pose<S>& pose, const Vec3<S>& x, const ContactNumbers<S>& numbers,
                  const Touch<S>& at, const Vec3<S>& bar, ContactNumbers<S>& numbers_bar, Pose<S>& pose_bar) {
   const Vec3<S> none(S(0.0), S(0.0), S(0.0)), force_bar = turned_vjp(pose, at.force, bar, pose_bar);
   return in_frame_vjp(pose, x, touch_vjp(shape, pose.in_frame(x), numbers, force_bar, none, numbers_bar), pose_bar);

@@ -2,7 +2,7 @@
 // before and to the inputs.
 #pragma once
 
-#include "adjoint/solver/contact_source_vjp.h"
+#include "adjoint/solver/swept_contacts_vjp.h"
 #include "adjoint/step/stages.h"
 #include "core/step/carry_friction.h"
 
@@ -52,6 +52,14 @@ struct ReverseOf<CarryFriction> {
                   [&](int node) -> T& { return bar.w[node]; });
     });
     if (last) poses_vjp(*last, poses_bar, bar.in);
+    for_each_packed(step, [&](int lane, const SweptGroup& group, std::size_t g) {
+      PackedContacts& own = (*work.swept)[lane].packed[g];
+      const auto x = scene_points<const T>(work.q.data, work.q.stride, lane);
+      const auto x_bar = scene_points(bar.x_next, 3, lane);
+      contact_kernels(scene, group)
+          .carry_vjp(own.contacts(), own.carry(x, x_bar, value_of(rate)), x_bar,
+                     (*bar.swept)[lane].packed[g].cotangents());
+    });
     // They were written, whatever they were before.
     for (const Contact& contact : scene.contacts)
       for (int i = 0; i < contact.points(); ++i)

@@ -17,6 +17,9 @@ namespace sheetbend {
 template <class S>
 struct ReverseOf;
 
+template <class S>
+struct SweptContactCotangents;  // adjoint/solver/swept_contacts_vjp.h
+
 // What the reverses hand on to each other.
 template <class T>
 struct StepCotangents {
@@ -29,6 +32,7 @@ struct StepCotangents {
   StateCotangents<T> from;   // of the states at n and n-1, added to
   Inputs<T> in;              // of the inputs, added to
   T* multipliers = nullptr;  // of Work::multipliers
+  std::vector<SweptContactCotangents<Single<T>>>* swept = nullptr;  // of Work::swept
 };
 
 // Reverse of history().

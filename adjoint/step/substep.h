@@ -43,6 +43,7 @@ void substep_vjp(const Step<T>& step, T* q, T* x_next_bar, const T* v_next_bar, 
                                masses.w_of_forces.data(),
                                bar,
                                in_bar};
+  cotangents.swept = &colors.contacts;
   if (auto& own = scratch.template of<KeepSpin>().multipliers; !own.empty()) cotangents.multipliers = own.data();
   List::backward([&]<class Stage>(Stage) {
     ReverseOf<Stage>::run(step, work, record.template of<Stage>(), scratch.template of<Stage>(), cotangents);

@@ -111,7 +111,6 @@ void ReverseOf<SweepColors>::run(const Step<T>& step, const Work<T>& work, Sweep
   const bool swept = !step.plan.colors.empty();
   for (auto* buffer : {&scratch.C_r, &scratch.fixed, &scratch.lambda})
     std::fill(buffer->begin(), buffer->end(), T(0.0));
-  for (auto& contacts : scratch.contacts) contacts.clear();
   if constexpr (in_packs<T>)
     if (swept) begin_sweeps_vjp(step.scene, step.plan.packs, o.threads, step.in, record.packs, bar.in, scratch.packs);
   for (int iteration = o.iterations - 1; iteration >= 0; --iteration) {

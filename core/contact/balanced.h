@@ -6,27 +6,25 @@
 // closed form. A curved shape is replaced by its tangent plane at the place found last, until the place stays.
 #pragma once
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <limits>
 
 #include "core/contact/touch.h"
 
 namespace sheetbend {
 
-// The inverse of a (3, 3) matrix, row by row; its products with vectors of any scalar.
+// The inverse of a (3, 3) matrix, row by row; its products with vectors of V or of a larger scalar.
+template <class V>
 struct Inverse3 {
-  double m[9];
+  V m[9];
 
-  explicit Inverse3(const double* a) {
+  explicit Inverse3(const V* a) {
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) {
         const int p = (i + 1) % 3, q = (i + 2) % 3, r = (j + 1) % 3, s = (j + 2) % 3;
         m[3 * j + i] = a[3 * p + r] * a[3 * q + s] - a[3 * p + s] * a[3 * q + r];
       }
-    const double determinant = a[0] * m[0] + a[1] * m[3] + a[2] * m[6];
-    for (double& e : m) e /= determinant;
+    const V determinant = a[0] * m[0] + a[1] * m[3] + a[2] * m[6];
+    for (V& e : m) e = e / determinant;
   }
   template <class S>
   Vec3<S> times(const Vec3<S>& v) const {
@@ -41,12 +39,12 @@ struct Inverse3 {
 };
 
 // (I - w dF/dz)^-1 at z, with the curvature of the shape.
-inline Inverse3 balance_inverse(const AnyShape& shape, const Vec3<double>& z, double w,
-                                const ContactNumbers<double>& c) {
-  double A[9];
-  touch_matrix(shape, z, c, true, A);
-  for (int i = 0; i < 9; ++i) A[i] = w * A[i] + (i % 4 == 0 ? 1.0 : 0.0);
-  return Inverse3(A);
+template <class Shape, class V>
+Inverse3<V> balance_inverse(const Shape& shape, const Vec3<V>& z, const V& w, const ContactNumbers<V>& c) {
+  V A[9];
+  curved_touch_matrix(shape, z, c, A);
+  for (int i = 0; i < 9; ++i) A[i] = w * A[i] + V(i % 4 == 0 ? 1.0 : 0.0);
+  return Inverse3<V>(A);
 }
 
 // What is left of z = y + w F(z).
@@ -55,49 +53,69 @@ Vec3<S> unbalance(const AnyShape& shape, const Vec3<S>& z, const Vec3<S>& y, con
   return z - y - w * touch(shape, z, c).force;
 }
 
-inline double largest_of(const Vec3<double>& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
+template <class V>
+V largest_of(const Vec3<V>& v) {
+  const V x = magnitude(v.x), y = magnitude(v.y), z = magnitude(v.z), xy = select(x < y, y, x);
+  return select(xy < z, z, xy);
+}
 
-// The solution for values. `found` says whether the tangent planes lead to one, to rounding.
+// The solution for values, in V: double or lanes. `found` says whether the tangent planes lead to one, to rounding.
+template <class V>
 struct Balanced {
-  Vec3<double> z;
-  bool pushes, found;
+  Vec3<V> z;
+  MaskOf<V> pushes, found;
 };
 
 // The solution where the distance is linear: `distance` at the place `at`, with the gradient n.
-inline Balanced balanced_on_plane(const AnyShape& shape, const Vec3<double>& at, double distance, const Vec3<double>& n,
-                                  const Vec3<double>& y, double w, const ContactNumbers<double>& c) {
-  const Vec3<double> normal = unit_normal(shape, n);
-  const double gap = distance - c.radius - c.lift + dot(n, y - at), steep = shape.grid ? norm(n) : 1.0;
+template <class Shape, class V>
+Balanced<V> balanced_on_plane(const Shape& shape, const Vec3<V>& at, const V& distance, const Vec3<V>& n,
+                              const Vec3<V>& y, const V& w, const ContactNumbers<V>& c) {
+  const V zero(0.0), one(1.0);
+  const Vec3<V> normal = unit_normal(shape, n);
+  const V gap = distance - c.radius - c.lift + dot(n, y - at), steep = shape.grid ? norm(n) : one;
   // q = w times the push along n: q = -stiff (gap + steep^2 q) (share - loss q)
-  const double stiff = c.firm * c.kappa * w, loss = c.dissipates ? c.loss * steep : 0.0;
-  const double share = c.dissipates ? 1.0 - c.loss * dot(normal, y - c.from) : 1.0;
-  if (!(gap < 0.0) || !(share > 0.0)) return {y, false, true};
-  const double linear = 1.0 + stiff * (steep * steep * share - loss * gap), constant = -stiff * gap * share;
-  const double q =
-      2.0 * constant / (linear + std::sqrt(linear * linear - 4.0 * stiff * steep * steep * loss * constant));
-  const Vec3<double> trial = w * (c.carried - c.kappa * (y - c.from));
-  const Vec3<double> slip = trial - dot(normal, trial) * normal;
-  const double limit = steep * c.friction * q, stuck = 1.0 / (1.0 + c.kappa * w), size = norm(slip);
-  return {y + q * n + (size * stuck > limit ? limit / size : stuck) * slip, true, true};
+  const V stiff = V(c.firm) * c.kappa * w, loss = c.dissipates ? c.loss * steep : zero;
+  const V share = c.dissipates ? one - c.loss * dot(normal, y - c.from) : one;
+  const MaskOf<V> pushes = (gap < zero) & (share > zero);
+  const MaskOf<V> found = zero < one;
+  if (!any(pushes)) return {y, pushes, found};
+  const V linear = one + stiff * (steep * steep * share - loss * gap), constant = -stiff * gap * share;
+  const V root = sqrt(linear * linear - V(4.0) * stiff * steep * steep * loss * constant);
+  const V q = V(2.0) * constant / (linear + root);
+  const Vec3<V> trial = w * (c.carried - c.kappa * (y - c.from));
+  const Vec3<V> slip = trial - dot(normal, trial) * normal;
+  const V limit = steep * c.friction * q, stuck = one / (one + c.kappa * w), size = norm(slip);
+  const V kept = select(size * stuck > limit, limit / size, stuck);
+  return {select(pushes, y + q * n + kept * slip, y), pushes, found};
 }
 
-inline Balanced balanced(const AnyShape& shape, const Vec3<double>& y, double w, const ContactNumbers<double>& c) {
+template <class Shape, class V>
+Balanced<V> balanced(const Shape& shape, const Vec3<V>& y, const V& w, const ContactNumbers<V>& c) {
   constexpr int most_planes = 200;
-  constexpr double rounding = 4.0 * std::numeric_limits<double>::epsilon();
-  Balanced b{y, false, true};
-  Vec3<double> last;
+  const V rounding(4.0 * std::numeric_limits<double>::epsilon());
+  const MaskOf<V> all = V(0.0) < V(1.0);
+  Balanced<V> b{y, !all, all};
+  MaskOf<V> open = all;
+  Vec3<V> last;
   for (int plane = 0; plane < most_planes; ++plane) {
-    double at[3], distance, gradient[3];
+    V at[3], distance, gradient[3];
     b.z.store(at);
     distance_from(shape, at, c.size, distance, gradient);
-    const Vec3<double> n(gradient);
-    if (plane > 0 && largest_of(n - last) == 0.0) return b;  // the surface is flat here
-    const Balanced next = balanced_on_plane(shape, b.z, distance, n, y, w, c);
-    const double moved = largest_of(next.z - b.z);
-    b = next, last = n;
-    if (!(moved > rounding * (largest_of(y) + largest_of(b.z - y)))) return b;  // of NaN too, which the rollout finds
+    const Vec3<V> n(gradient);
+    if (plane > 0) {
+      open = open & (largest_of(n - last) > V(0.0));  // otherwise the surface is flat here
+      if (!any(open)) return b;
+    }
+    const Balanced<V> next = balanced_on_plane(shape, b.z, distance, n, y, w, c);
+    const V moved = largest_of(next.z - b.z);
+    b.z = select(open, next.z, b.z);
+    b.pushes = (open & next.pushes) | (b.pushes & !open);
+    last = n;
+    // What is not a number stays where it is: the rollout finds it.
+    open = open & (moved > rounding * (largest_of(y) + largest_of(b.z - y)));
+    if (!any(open)) return b;
   }
-  b.found = false;
+  b.found = !open;
   return b;
 }
 
@@ -106,7 +124,7 @@ inline Balanced balanced(const AnyShape& shape, const Vec3<double>& y, double w,
 template <class S>
 Vec3<S> balanced_near(const AnyShape& shape, const Vec3<double>& z, const Vec3<S>& y, const S& w,
                       const ContactNumbers<S>& c) {
-  const Inverse3 inverse = balance_inverse(shape, z, value_of(w), values_of(c));
+  const Inverse3<double> inverse = balance_inverse(shape, z, value_of(w), values_of(c));
   Vec3<S> at(S(z.x), S(z.y), S(z.z));
   for (int pass = 0; pass < 2; ++pass) at = at - inverse.times(unbalance(shape, at, y, w, c));
   return at;

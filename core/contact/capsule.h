@@ -14,7 +14,7 @@ struct Capsule {
   template <class T>
   static void evaluate(const T* z, const T* size, T& distance, T* n) {
     const T &half = size[1], zero(0.0);
-    const T beyond = z[2] > half ? z[2] - half : z[2] < -half ? z[2] + half : zero;
+    const T beyond = select(z[2] > half, z[2] - half, select(z[2] < -half, z[2] + half, zero));
     distance = normalize(Vec3<T>(z[0], z[1], beyond), {T(1.0), zero, zero}, n) - size[0];
   }
 };

@@ -10,13 +10,13 @@
 //
 // z (3) is a point in the shape's own frame [m], `distance` its distance from the surface [m], negative inside, and n (3) the gradient of the distance with
 // respect to z, a unit vector. Where the distance has a kink, n is that of one side. No number may be divided by zero: a shape says in its header what it does
-// where there is no direction. T is never a pack, so branches may look at value_of(). shapes.h lists all shapes. distance_field.h differs: it reads a grid
-// in the place of sizes, and its gradient is no unit vector to the last digit.
+// where there is no direction. T may be a pack, so branches are written with select(). shapes.h lists all shapes. distance_field.h differs: it reads a grid
+// in the place of sizes, its gradient is no unit vector to the last digit, and its T is never a pack.
 #pragma once
 
 #include <array>
 
-#include "core/scalar/vec3.h"
+#include "core/contact/masks.h"
 
 namespace sheetbend {
 
@@ -27,13 +27,10 @@ inline constexpr int size_count = static_cast<int>(S::sizes.size());
 template <class T>
 T normalize(const Vec3<T>& v, const Vec3<T>& otherwise, T* n) {
   const T squared = dot(v, v);
-  if (!(value_of(squared) > 0.0)) {
-    otherwise.store(n);
-    return T(0.0);
-  }
-  const T length = sqrt(squared);
-  ((T(1.0) / length) * v).store(n);
-  return length;
+  const auto has_length = squared > T(0.0);
+  const T length = sqrt(select(has_length, squared, T(1.0)));
+  select(has_length, (T(1.0) / length) * v, otherwise).store(n);
+  return select(has_length, length, T(0.0));
 }
 
 }  // namespace sheetbend

@@ -9,6 +9,7 @@
 // from the signs here and are decided nowhere else. All vectors are in the collider's frame, which turns what is carried along with it.
 #pragma once
 
+#include "core/contact/masks.h"
 #include "core/contact/plain_vec3.h"
 
 namespace sheetbend {
@@ -18,31 +19,37 @@ inline constexpr double rigidity = 1e3;
 
 template <class T>
 struct ContactForce {
-  T normal{};                                         // lambda_n
-  Vec3<T> tangential;                                 // lambda_t
-  bool pushes = false, slides = false, rubs = false;  // rubs: pushes, and friction or dissipation may act: no potential
+  using Mask = MaskOf<T>;
+  T normal{};                       // lambda_n
+  Vec3<T> tangential;               // lambda_t
+  Mask pushes{}, slides{}, rubs{};  // rubs: pushes, and friction or dissipation may act: no potential
 };
 
-// T is never a pack; C is T, or double where these numbers do not vary. `loss` is a/eta, of a contact that dissipates.
+// C is T, or double where these numbers do not vary. `loss` is a/eta, of a contact that dissipates.
 template <class T, class C>
 ContactForce<T> contact_force(const T& gap, const Vec3<C>& n, const Vec3<T>& slip, const Vec3<C>& carried,
                               const C& friction, const C& kappa, const C* loss = nullptr) {
+  const T zero(0.0);
   ContactForce<T> c;
-  if (!(value_of(gap) < 0.0)) return c;
-  c.normal = -(kappa * gap);
+  c.pushes = gap < zero;
+  if (!any(c.pushes)) return c;
+  T normal = -(kappa * gap);
   if (loss) {
     const T share = T(1.0) - *loss * dot(n, slip);
-    if (!(value_of(share) > 0.0)) return c = {};
-    c.normal = c.normal * share;
+    c.pushes = c.pushes & (share > zero);
+    if (!any(c.pushes)) return c;
+    normal = normal * share;
   }
-  c.pushes = true;
+  c.normal = select(c.pushes, normal, zero);
   const T limit = friction * c.normal;
-  c.rubs = loss || value_of(limit) > 0.0;
+  c.rubs = c.pushes;
+  if (!loss) c.rubs = c.rubs & (limit > zero);
   const Vec3<T> trial = carried - kappa * slip;
   const Vec3<T> tau = trial - dot(n, trial) * n;
   const T squared = dot(tau, tau);
-  c.slides = value_of(squared) > value_of(limit) * value_of(limit);
-  c.tangential = c.slides ? (limit / sqrt(squared)) * tau : tau;
+  c.slides = c.pushes & (squared > limit * limit);
+  const Vec3<T> none(zero, zero, zero);
+  c.tangential = select(c.pushes, select(c.slides, (limit / sqrt(squared)) * tau, tau), none);
   return c;
 }
 

@@ -14,23 +14,21 @@ struct RoundedBox {
 
   template <class T>
   static void evaluate(const T* z, const T* size, T& distance, T* n) {
-    T q[3], sign[3], outside[3];
-    int face = 0;
-    bool within = true;
+    const T zero(0.0), one(1.0);
+    T sign[3], outside[3], face[3], nearest(0.0);  // face: the normal of the nearest face
+    MaskOf<T> beyond = zero > one;
     for (int d = 0; d < 3; ++d) {
-      sign[d] = T(z[d] < T(0.0) ? -1.0 : 1.0);
-      q[d] = sign[d] * z[d] - (size[d] - size[3]);
-      outside[d] = q[d] > T(0.0) ? q[d] : T(0.0);
-      within = within && !(q[d] > T(0.0));
-      if (q[d] > q[face]) face = d;
+      sign[d] = select(z[d] < zero, -one, one);
+      const T q = sign[d] * z[d] - (size[d] - size[3]);
+      outside[d] = select(q > zero, q, zero);
+      beyond = beyond | (q > zero);
+      const MaskOf<T> nearer = d == 0 ? one > zero : q > nearest;
+      nearest = select(nearer, q, nearest);
+      for (int e = 0; e < d; ++e) face[e] = select(nearer, zero, face[e]);
+      face[d] = select(nearer, sign[d], zero);
     }
-    if (within) {
-      for (int d = 0; d < 3; ++d) n[d] = d == face ? sign[d] : T(0.0);
-      distance = q[face] - size[3];
-      return;
-    }
-    distance = normalize(Vec3<T>(outside), {T(0.0), T(0.0), T(1.0)}, n) - size[3];
-    for (int d = 0; d < 3; ++d) n[d] = sign[d] * n[d];
+    distance = select(beyond, normalize(Vec3<T>(outside), {zero, zero, one}, n), nearest) - size[3];
+    for (int d = 0; d < 3; ++d) n[d] = select(beyond, sign[d] * n[d], face[d]);
   }
 };
 

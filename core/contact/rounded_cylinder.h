@@ -15,20 +15,18 @@ struct RoundedCylinder {
 
   template <class T>
   static void evaluate(const T* z, const T* size, T& distance, T* n) {
-    const T zero(0.0), one(1.0), sign(z[2] < zero ? -1.0 : 1.0);
+    const T zero(0.0), one(1.0), sign = select(z[2] < zero, -one, one);
     T side[3], q[3];  // the directions of growing q: the side's normal, and the third axis times the sign
     const T from_axis = normalize(Vec3<T>(z[0], z[1], zero), {one, zero, zero}, side);
     q[0] = from_axis - (size[0] - size[2]);
     q[1] = sign * z[2] - (size[1] - size[2]);
     T share[3];
-    if (q[0] > zero || q[1] > zero) {
-      const Vec3<T> outside(q[0] > zero ? q[0] : zero, q[1] > zero ? q[1] : zero, zero);
-      distance = normalize(outside, {one, zero, zero}, share) - size[2];
-    } else {
-      const bool end = q[1] > q[0];
-      share[0] = T(end ? 0.0 : 1.0), share[1] = T(end ? 1.0 : 0.0);
-      distance = (end ? q[1] : q[0]) - size[2];
-    }
+    const Vec3<T> outside(select(q[0] > zero, q[0], zero), select(q[1] > zero, q[1], zero), zero);
+    const auto beyond = (q[0] > zero) | (q[1] > zero);
+    const auto end = q[1] > q[0];
+    distance = select(beyond, normalize(outside, {one, zero, zero}, share), select(end, q[1], q[0])) - size[2];
+    share[0] = select(beyond, share[0], select(end, zero, one));
+    share[1] = select(beyond, share[1], select(end, one, zero));
     n[0] = share[0] * side[0], n[1] = share[0] * side[1], n[2] = share[1] * sign;
   }
 };

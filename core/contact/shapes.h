@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <stdexcept>
 #include <string>
 #include <tuple>
 #include <type_traits>
@@ -36,6 +35,8 @@ struct AnyShape {
   AnyShape(int number_, const DistanceGrid* grid_ = nullptr) : number(number_), grid(grid_) {}
 };
 
+[[noreturn]] void throw_unknown_shape(int shape);
+
 // Calls f with an object of the shape type that `shape` numbers.
 template <int I = 0, class F>
 void with_shape(int shape, F&& f) {
@@ -43,22 +44,22 @@ void with_shape(int shape, F&& f) {
     if (shape == I) return f(std::tuple_element_t<I, Shapes>{});
     with_shape<I + 1>(shape, f);
   } else {
-    throw std::logic_error("shape " + std::to_string(shape) + " is not in the list");
+    throw_unknown_shape(shape);
   }
 }
 
 // The number of a shape's name; throws std::invalid_argument that lists the known ones.
-inline int shape_of(const std::string& name) {
-  int found = -1;
-  std::string known;
-  for (int shape = 0; shape < shape_count; ++shape)
-    with_shape(shape, [&]<class S>(S) {
-      if (name == S::name) found = shape;
-      known += (shape ? ", " : "") + std::string(S::name);
-    });
-  if (found < 0) throw std::invalid_argument("colliders: no shape is called '" + name + "'. Fix: use one of " + known);
-  return found;
-}
+int shape_of(const std::string& name);
+
+// A shape that the compiler knows, in the place of AnyShape: where its numbers are in lanes.
+template <class S>
+struct OneShape {
+  static constexpr const DistanceGrid* grid = nullptr;
+};
+template <class Shape>
+inline constexpr int sizes_of = most_sizes;
+template <class S>
+inline constexpr int sizes_of<OneShape<S>> = size_count<S>;
 
 // The distance from the surface and its gradient, as in gap.h.
 template <class T>
@@ -71,9 +72,14 @@ void distance_from(const AnyShape& shape, const T* z, const T* size, T& distance
   });
 }
 
+template <class S, class T>
+void distance_from(const OneShape<S>&, const T* z, const T* size, T& distance, T* n) {
+  S::evaluate(z, size, distance, n);
+}
+
 // The direction of that gradient, which only a grid's spline may have of another length than one; the third axis where it is zero.
-template <class T>
-Vec3<T> unit_normal(const AnyShape& shape, const Vec3<T>& n) {
+template <class Shape, class T>
+Vec3<T> unit_normal(const Shape& shape, const Vec3<T>& n) {
   if (!shape.grid) return n;
   T unit[3];
   normalize(n, {T(0.0), T(0.0), T(1.0)}, unit);

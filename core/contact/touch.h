@@ -27,19 +27,18 @@ struct Touch : ContactForce<T> {
 
 // At this distance, with this gradient; C as in law.h. The push is along the gradient, so that it has a potential, and Coulomb's limit is that of the
 // whole push.
-template <class T, class C>
-Touch<T> touch(const AnyShape& shape, const T& distance, const Vec3<C>& n, const Vec3<T>& z,
-               const ContactNumbers<C>& c) {
+template <class Shape, class T, class C>
+Touch<T> touch(const Shape& shape, const T& distance, const Vec3<C>& n, const Vec3<T>& z, const ContactNumbers<C>& c) {
   const T gap = T(c.firm) * (distance - T(c.radius) - T(c.lift));
   const C friction = shape.grid ? sqrt(dot(n, n)) * c.friction : c.friction;
   const C* loss = c.dissipates ? &c.loss : nullptr;
   Touch<T> t{contact_force(gap, unit_normal(shape, n), z - c.from, c.carried, friction, c.kappa, loss), {}};
-  if (t.pushes) t.force = t.normal * n + t.tangential;
+  if (any(t.pushes)) t.force = t.normal * n + t.tangential;
   return t;
 }
 
-template <class T>
-Touch<T> touch(const AnyShape& shape, const Vec3<T>& z, const ContactNumbers<T>& c) {
+template <class Shape, class T>
+Touch<T> touch(const Shape& shape, const Vec3<T>& z, const ContactNumbers<T>& c) {
   T at[3], distance, n[3];
   z.store(at);
   distance_from(shape, at, c.size, distance, n);
@@ -79,8 +78,18 @@ ContactNumbers<double> values_of(const ContactNumbers<T>& c) {
   return v;
 }
 
-// A = -d force/dz, row by row, with or without the curvature of the shape: without it the normal stays, as Newton's method may have it. Returns
-// what acts.
+// A = -d force/dz of a contact that pushes, row by row, with the curvature of the shape.
+template <class Shape, class V>
+void curved_touch_matrix(const Shape& shape, const Vec3<V>& z, const ContactNumbers<V>& c, V* A) {
+  using D = Dual<V, 3>;
+  D at[3] = {D(z.x), D(z.y), D(z.z)}, force[3];
+  for (int d = 0; d < 3; ++d) at[d].d[d] = V(1.0);
+  touch(shape, Vec3<D>(at), constants<D>(c)).force.store(force);
+  for (int a = 0; a < 3; ++a)
+    for (int b = 0; b < 3; ++b) A[3 * a + b] = -force[a].d[b];
+}
+
+// The same, or without that curvature: then the normal stays, as Newton's method may have it. Returns what acts.
 inline Touch<double> touch_matrix(const AnyShape& shape, const Vec3<double>& z, const ContactNumbers<double>& c,
                                   bool curved, double* A) {
   using D = Dual<double, 3>;
@@ -90,16 +99,17 @@ inline Touch<double> touch_matrix(const AnyShape& shape, const Vec3<double>& z, 
   const Touch<double> plain = touch(shape, distance, Vec3<double>(n), z, c);
   std::fill_n(A, 9, 0.0);
   if (!plain.pushes) return plain;
+  if (curved) {
+    curved_touch_matrix(shape, z, c, A);
+    return plain;
+  }
   D zd[3], force[3], distance_d(distance);
   for (int d = 0; d < 3; ++d) {
     zd[d] = D(at[d]);
     zd[d].d[d] = 1.0;
     distance_d.d[d] = n[d];
   }
-  if (curved)
-    touch(shape, Vec3<D>(zd), constants<D>(c)).force.store(force);
-  else
-    touch(shape, distance_d, Vec3<double>(n), Vec3<D>(zd), c).force.store(force);
+  touch(shape, distance_d, Vec3<double>(n), Vec3<D>(zd), c).force.store(force);
   for (int a = 0; a < 3; ++a)
     for (int b = 0; b < 3; ++b) A[3 * a + b] = -force[a].d[b];
   return plain;

@@ -14,6 +14,7 @@
 #include "core/solver/ordering.h"
 #include "core/solver/paired_pattern.h"
 #include "core/solver/plan_checks.h"
+#include "core/solver/swept_groups.h"
 
 namespace sheetbend {
 namespace {
@@ -241,16 +242,6 @@ std::vector<int> loose_beside(const Scene& scene, const std::vector<Member>& mem
   return {loose.begin(), loose.end()};
 }
 
-// The contacts of movable particles.
-std::vector<SweptContact> swept_contacts(const Scene& scene) {
-  std::vector<SweptContact> contacts;
-  for (int c = 0; c < static_cast<int>(scene.contacts.size()); ++c)
-    for (int i = 0; i < scene.contacts[c].points(); ++i)
-      if (const Contact& own = scene.contacts[c]; moves(scene, own, i))
-        contacts.push_back({c, i, own.first_node(i), own.collider, scene.colliders[own.collider].any()});
-  return contacts;
-}
-
 // The movable particles of contacts that are in none of these blocks.
 std::vector<int> loose_in_contact(const Scene& scene, const std::vector<DirectBlock>& blocks) {
   std::vector<char> known(scene.nodes(), false);
@@ -381,6 +372,7 @@ Plan make_plan(const Scene& scene, const SolverOptions& options) {
     plan.colors = color_constraints(scene);
     plan.packs = pack_colors(scene, plan.colors);
     plan.contacts = swept_contacts(scene);
+    plan.contact_groups = swept_groups(scene, plan.contacts);
     return plan;
   }
   auto chains = connected_chains(scene);

@@ -1,18 +1,33 @@
 // Contacts of particles that go by sweeps. After each pass over the constraints every contact is projected: what the constraints and other contacts have
 // made of its particle, its own force of the pass before taken off, is y; the particle goes to x = y + w F(x) (core/contact/balanced.h). F is
 // the force of the whole substep and no increment, so that Coulomb's limit is that of the whole push, and what a contact pushed too far in an early pass
-// it takes back later. One thread works, in the order of contacts, so bits do not depend on their number.
+// it takes back later. One thread works, in the order of contacts, so bits do not depend on their number. Numbers go eight contacts at a time
+// (packed_contacts.h), other scalars one by one; the bits of numbers are the same in both.
 #pragma once
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
 #include "core/contact/balanced.h"
 #include "core/solver/contact_source.h"
+#include "core/solver/packed_contacts.h"
 #include "core/solver/plan.h"
 #include "core/solver/unbalanced.h"
 
 namespace sheetbend {
+
+// Whether a group goes in packs, in scenes of an S.
+template <class S>
+bool goes_in_packs(const SweptGroup& group) {
+  return std::is_same_v<S, double> && group.packed();
+}
+
+template <class S>
+bool all_go_in_packs(const Plan& plan) {
+  return !plan.contact_groups.empty() &&
+         std::ranges::all_of(plan.contact_groups, [](const SweptGroup& group) { return goes_in_packs<S>(group); });
+}
 
 // The contacts of one scene of a T.
 template <class S>
@@ -23,20 +38,30 @@ struct SweptContacts {
     bool pushes = false;
   };
   ColliderPoses<S> poses;
-  std::vector<ContactNumbers<S>> numbers;  // per contact of the plan; of those that have not come near, radius and size
+  // Of contacts one by one, none where all go in packs. Of those that have not come near, radius and size.
+  std::vector<ContactNumbers<S>> numbers;
   // Likewise: whether all its numbers are at hand, because a pass found it below the surface, or it rebounds.
   std::vector<char> near;
-  std::vector<Push> pushes;  // contact after contact, of all passes or the last one
+  std::vector<Push> pushes;            // contact after contact, of all passes or the last one
+  std::vector<PackedContacts> packed;  // per group; empty of those that go one by one
 
+  static std::size_t one_by_one(const Plan& plan) { return all_go_in_packs<S>(plan) ? 0 : plan.contacts.size(); }
   void resize(const Plan& plan, int kept_iterations) {
-    numbers.resize(plan.contacts.size());
-    near.resize(plan.contacts.size());
-    pushes.resize(std::max(1, kept_iterations) * plan.contacts.size());
+    const std::size_t own = one_by_one(plan);
+    numbers.resize(own);
+    near.resize(own);
+    pushes.resize(std::max(1, kept_iterations) * own);
+    packed.resize(plan.contact_groups.size());
+    for (std::size_t g = 0; g < packed.size(); ++g)
+      if (goes_in_packs<S>(plan.contact_groups[g])) packed[g].resize(plan.contact_groups[g], kept_iterations);
   }
   static std::size_t bytes(const Scene& scene, const Plan& plan, int kept_iterations) {
-    return 3 * sizeof(Pose<S>) * scene.colliders.size() +
-           (sizeof(ContactNumbers<S>) + sizeof(char) + std::max(1, kept_iterations) * sizeof(Push)) *
-               plan.contacts.size();
+    std::size_t sum =
+        3 * sizeof(Pose<S>) * scene.colliders.size() + sizeof(PackedContacts) * plan.contact_groups.size() +
+        (sizeof(ContactNumbers<S>) + sizeof(char) + std::max(1, kept_iterations) * sizeof(Push)) * one_by_one(plan);
+    for (const SweptGroup& group : plan.contact_groups)
+      if (goes_in_packs<S>(group)) sum += PackedContacts::bytes(group, kept_iterations);
+    return sum;
   }
   Push& push(int iteration, int i) {
     return pushes[pushes.size() == numbers.size() ? i : iteration * numbers.size() + i];
@@ -51,15 +76,23 @@ struct SweptContacts {
   template <class T>
   void begin(const ContactSource<T>& source, const Plan& plan) {
     poses = source.poses();
-    for (std::size_t i = 0; i < numbers.size(); ++i) {
-      const SweptContact& c = plan.contacts[i];
-      near[i] = source.scene.contacts[c.contact].rebounds(c.item);
-      if (near[i]) {
-        numbers[i] = source.numbers(poses, c.contact, c.item);
-        continue;
+    for (std::size_t g = 0; g < packed.size(); ++g) {
+      const SweptGroup& group = plan.contact_groups[g];
+      if constexpr (std::is_same_v<S, double>)
+        if (group.packed()) {
+          packed[g].begin(source, group, poses);
+          continue;
+        }
+      for (int i = group.first; i < group.first + group.count; ++i) {
+        const SweptContact& c = plan.contacts[i];
+        near[i] = source.scene.contacts[c.contact].rebounds(c.item);
+        if (near[i]) {
+          numbers[i] = source.numbers(poses, c.contact, c.item);
+          continue;
+        }
+        numbers[i].radius = source.read(source.in.of(Quantity::contact_radius)[c.contact]);
+        source.read_size(source.scene.colliders[c.collider], numbers[i].size);
       }
-      numbers[i].radius = source.read(source.in.of(Quantity::contact_radius)[c.contact]);
-      source.read_size(source.scene.colliders[c.collider], numbers[i].size);
     }
   }
   // Whether contact i is to be looked at with its particle at y, all its numbers then at hand.
@@ -83,7 +116,7 @@ typename SweptContacts<S>::Push push_out(const AnyShape& shape, const Pose<S>& p
                                          const ContactNumbers<S>& numbers, bool& found) {
   constexpr bool plain = std::is_same_v<S, double>;
   const Vec3<S> own = pose.in_frame(y);
-  Balanced at;
+  Balanced<double> at;
   if constexpr (plain)
     at = balanced(shape, own, w, numbers);
   else
@@ -96,33 +129,54 @@ typename SweptContacts<S>::Push push_out(const AnyShape& shape, const Pose<S>& p
   return {y + moved, (S(1.0) / w) * moved, true};
 }
 
-// One pass over all contacts of a scene of T. at(node, d) is where a coordinate stands; the first pass (0) starts from no forces. Throws Unbalanced.
+[[noreturn]] inline void throw_no_place(const Scene& scene, const SweptContact& c) {
+  throw Unbalanced(
+      "particle " + std::to_string(c.node) + " finds no place on the surface of " + scene.contacts[c.contact].name,
+      "use smaller substeps", 0, 0.0, c.node);
+}
+
+// One pass over contact i of a plan alone.
 template <class T, class At>
-void project_contacts(const ContactSource<T>& source, const Plan& plan, int iteration, At&& at,
-                      SweptContacts<Single<T>>& contacts) {
+void project_contact(const ContactSource<T>& source, const Plan& plan, int iteration, int i, At&& at,
+                     SweptContacts<Single<T>>& contacts) {
   using S = Single<T>;
-  for (int i = 0; i < static_cast<int>(plan.contacts.size()); ++i) {
-    const SweptContact& c = plan.contacts[i];
-    T q[3] = {T(at(c.node, 0)), T(at(c.node, 1)), T(at(c.node, 2))};
-    Vec3<S> y = source.read(Vec3<T>(q));
-    const auto& before = contacts.before(iteration, i);
-    const bool pushed = before.pushes;
-    if (pushed) y = y - source.read(source.w[c.node]) * before.force;
-    auto& push = contacts.push(iteration, i);
-    if (!contacts.comes_near(source, c, i, y)) {
-      push.pushes = false;
-      continue;
-    }
-    bool found;
-    push = push_out(c.shape, contacts.poses.next[c.collider], y, source.read(source.w[c.node]), contacts.numbers[i],
-                    found);
-    if (!found)
-      throw Unbalanced("particle " + std::to_string(c.node) + " finds no place on the surface of " +
-                           source.scene.contacts[c.contact].name,
-                       "use smaller substeps", 0, 0.0, c.node);
-    if (!pushed && !push.pushes) continue;
-    source.write(push.x, q);
-    for (int d = 0; d < 3; ++d) at(c.node, d) = q[d];
+  const SweptContact& c = plan.contacts[i];
+  T q[3] = {T(at(c.node, 0)), T(at(c.node, 1)), T(at(c.node, 2))};
+  Vec3<S> y = source.read(Vec3<T>(q));
+  const auto& before = contacts.before(iteration, i);
+  const bool pushed = before.pushes;
+  if (pushed) y = y - source.read(source.w[c.node]) * before.force;
+  auto& push = contacts.push(iteration, i);
+  if (!contacts.comes_near(source, c, i, y)) {
+    push.pushes = false;
+    return;
+  }
+  bool found;
+  push =
+      push_out(c.shape, contacts.poses.next[c.collider], y, source.read(source.w[c.node]), contacts.numbers[i], found);
+  if (!found) throw_no_place(source.scene, c);
+  if (!pushed && !push.pushes) return;
+  source.write(push.x, q);
+  for (int d = 0; d < 3; ++d) at(c.node, d) = q[d];
+}
+
+// One pass over all contacts of a scene of T, whose coordinates are in q; at(node, d) is where one stands. The first pass (0) starts from no forces. Throws
+// Unbalanced.
+template <class T, class At>
+void project_contacts(const ContactSource<T>& source, const Plan& plan, int iteration,
+                      [[maybe_unused]] const Coordinates<T>& q, At&& at, SweptContacts<Single<T>>& contacts) {
+  for (std::size_t g = 0; g < plan.contact_groups.size(); ++g) {
+    const SweptGroup& group = plan.contact_groups[g];
+    if constexpr (std::is_same_v<Single<T>, double>)
+      if (group.packed()) {
+        PackedContacts& own = contacts.packed[g];
+        const int lost = contact_kernels(source.scene, group)
+                             .project(own.contacts(), own.pass(iteration, scene_points(q.data, q.stride, source.lane)));
+        if (lost >= 0) throw_no_place(source.scene, plan.contacts[group.first + lost]);
+        continue;
+      }
+    for (int i = group.first; i < group.first + group.count; ++i)
+      project_contact(source, plan, iteration, i, at, contacts);
   }
 }
 

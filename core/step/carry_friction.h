@@ -7,18 +7,32 @@
 
 namespace sheetbend {
 
-// Calls f(source, poses, contact, item) for every contact of a movable point, one of the step's scenes after the other.
+// Calls f(source, poses, contact, item) for every contact of a movable point, one of the step's scenes after the other; not for those that go in packs.
 template <class T, class F>
 void for_each_contact(const Step<T>& step, const InverseMasses<T>& masses, F&& f) {
-  if (step.scene.contacts.empty()) return;
+  const auto in_packs = [&](int c) {
+    return std::ranges::any_of(step.plan.contact_groups, [&](const SweptGroup& group) {
+      return group.contact == c && goes_in_packs<Single<T>>(group);
+    });
+  };
+  if (step.scene.contacts.empty() || all_go_in_packs<Single<T>>(step.plan)) return;
   for (int lane = 0; lane < scenes_of<T>; ++lane) {
     if (!has(step.scenes, lane)) continue;
     const ContactSource<T> source = contact_source(step, masses, lane);
     const auto poses = source.poses();
     for (int c = 0; c < static_cast<int>(step.scene.contacts.size()); ++c)
-      for (int i = 0; i < step.scene.contacts[c].points(); ++i)
+      for (int i = 0; !in_packs(c) && i < step.scene.contacts[c].points(); ++i)
         if (moves(step.scene, step.scene.contacts[c], i)) f(source, poses, c, i);
   }
+}
+
+// Likewise f(lane, group, g) for every group of contacts that goes in packs.
+template <class T, class F>
+void for_each_packed(const Step<T>& step, F&& f) {
+  if constexpr (std::is_same_v<Single<T>, double>)
+    for (int lane = 0; lane < scenes_of<T>; ++lane)
+      for (std::size_t g = 0; has(step.scenes, lane) && g < step.plan.contact_groups.size(); ++g)
+        if (step.plan.contact_groups[g].packed()) f(lane, step.plan.contact_groups[g], g);
 }
 
 // What a point does at a collider in a substep.
@@ -63,6 +77,16 @@ struct CarryFriction {
       if (found.pushes && contact.rebounds(i)) carried = carried + numbers.leaving * normal_at(shape, z, numbers.size);
       source.write(carried, kept);
       mode = !found.pushes ? ContactMode::apart : found.slides ? ContactMode::slides : ContactMode::sticks;
+    });
+    for_each_packed(step, [&](int lane, const SweptGroup& group, std::size_t g) {
+      PackedContacts& own = (*work.swept)[lane].packed[g];
+      contact_kernels(scene, group)
+          .carry(own.contacts(),
+                 own.carry(scene_points<const T>(work.x_next, 3, lane), scene_points(work.x_next, 3, lane), rate));
+      const Contact& contact = scene.contacts[group.contact];
+      for (int i = 0; i < group.count; ++i)
+        record.modes[lane * count + contact.first + step.plan.contacts[group.first + i].item] =
+            static_cast<ContactMode>(own.modes()[i]);
     });
   }
 };

@@ -10,7 +10,8 @@ namespace sheetbend {
 inline constexpr double followed = 0.5;
 
 template <class T>
-Scenes where_contact_begins(const Step<T>& step, const InverseMasses<T>& masses, const T* x_next) {
+Scenes where_contact_begins(const Step<T>& step, const InverseMasses<T>& masses, const T* x_next,
+                            const std::vector<SweptContacts<Single<T>>>& swept) {
   const Scene& scene = step.scene;
   Scenes begun = 0;
   for (int lane = 0; lane < scenes_of<T>; ++lane) {
@@ -32,6 +33,11 @@ Scenes where_contact_begins(const Step<T>& step, const InverseMasses<T>& masses,
     };
     const auto any_begins = [&](int contact) {
       const Contact& c = scene.contacts[contact];
+      if constexpr (std::is_same_v<Single<T>, double>)
+        for (std::size_t g = 0; c.stiffness < 0 && g < step.plan.contact_groups.size(); ++g)
+          if (const SweptGroup& group = step.plan.contact_groups[g]; group.contact == contact && group.packed())
+            return contact_kernels(scene, group)
+                .begins(swept[lane].packed[g].contacts(), scene_points(x_next, 3, lane));
       for (int item = 0; item < c.points(); ++item)
         if (begins(c, contact, item)) return true;
       return false;

@@ -10,6 +10,7 @@
 #include "core/solver/contact_source.h"
 #include "core/solver/plan.h"
 #include "core/solver/states.h"
+#include "core/solver/swept_contacts.h"
 
 namespace sheetbend {
 
@@ -61,6 +62,7 @@ struct Work {
   bool finite = true;        // whether all of x_next is
   T* multipliers = nullptr;  // of the substep, where a later stage reads them
   const std::vector<Impact<Single<T>>>* impacts = nullptr;  // particle by particle, in order; none where it is null
+  std::vector<SweptContacts<Single<T>>>* swept = nullptr;   // per scene; none where no contacts go by sweeps
 };
 
 // What the contacts of a scene of T read of a substep.

@@ -44,6 +44,7 @@ template <class T, class List>
 Work<T> work_of(const Plan& plan, Records<T, List>& record, T* x_next, T* v_next) {
   Work<T> work{record.template of<ComputeEffectiveMasses>(),
                record.template of<SweepColors>().coordinates(plan, x_next), x_next, v_next};
+  work.swept = &record.template of<SweepColors>().contacts;
   if (auto& own = record.template of<KeepSpin>().multipliers; !own.empty()) work.multipliers = own.data();
   return work;
 }

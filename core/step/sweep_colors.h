@@ -160,7 +160,7 @@ void SweepColors::forward(const Step<T>& step, Work<T>& work, Record<T>& record)
       sweep(step, work, iteration, q, record);
       project_volumes(scene, step.in, step.bdf.eta, work.masses.w.data(), iteration, at, record.volumes);
       for_each_scene(step, work.masses, record.contacts, [&](const auto& source, auto& contacts) {
-        project_contacts(source, step.plan, iteration, at, contacts);
+        project_contacts(source, step.plan, iteration, work.q, at, contacts);
       });
     }
   });

@@ -186,6 +186,8 @@ struct Modes {
 };
 Modes modes_of(const Program& p, const std::vector<double>& inputs) {
   Rollout<double> rollout(p.scene, p.plan, inputs.data(), p.t0);
+  Plan one_by_one = p.plan;
+  one_by_one.contact_groups.clear();  // packs are looked at in the same way
   InverseMasses<double> masses;
   masses.resize(p.scene, p.plan, false);
   std::map<std::pair<int, int>, bool> touching;
@@ -195,12 +197,8 @@ Modes modes_of(const Program& p, const std::vector<double>& inputs) {
     x.assign(rollout.x(), rollout.x() + p.scene.dofs());
     x_before.assign(rollout.state().x_before, rollout.state().x_before + p.scene.dofs());
     rollout.advance();
-    const Step<double> step{p.scene,
-                            p.plan,
-                            {p.scene.layout, inputs.data()},
-                            rollout.bdf(),
-                            rollout.time(n + 1),
-                            {x.data(), x_before.data(), x.data(), x.data(), n}};
+    const Step<double> step{p.scene,       one_by_one,          {p.scene.layout, inputs.data()},
+                            rollout.bdf(), rollout.time(n + 1), {x.data(), x_before.data(), x.data(), x.data(), n}};
     ComputeEffectiveMasses::compute(step, masses);
     for_each_contact(step, masses, [&](const auto& source, const auto& poses, int c, int i) {
       const Contact& contact = p.scene.contacts[c];

@@ -20,7 +20,7 @@ ALLOWED = {
     "core/contact": {"core/scalar"},
     "core/scene": {"core/scalar", "core/constraints", "core/contact"},
     "core/element": {"core/scalar", "core/constraints"},
-    "core/packs": {"core/scalar", "core/constraints", "core/scene", "core/element", "core/threads"},
+    "core/packs": {"core/scalar", "core/constraints", "core/contact", "core/scene", "core/element", "core/threads"},
     "core/blocks": {"core/scalar", "core/constraints", "core/element", "core/packs"},
     "core/points": {"core/scalar"},
     "core/linear": {"core/scalar", "core/element", "core/packs", "core/blocks"},
@@ -59,7 +59,7 @@ ALLOWED = {
     "adjoint/element": {"core/scalar", "core/constraints", "core/scene", "core/element"},
     "adjoint/packs": {"core/constraints", "core/scene", "core/packs", "core/threads", "adjoint/element"},
     "adjoint/blocks": {"core/constraints", "core/blocks", "adjoint/element"},
-    "adjoint/contact": {"core/contact"},
+    "adjoint/contact": {"core/contact", "core/packs"},
     "adjoint/solver": {"core/solver", "adjoint/element", "adjoint/blocks", "adjoint/contact"},
     "adjoint/step": {"core/step", "adjoint/element", "adjoint/packs", "adjoint/solver"},
     "adjoint": {

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 import sheetbend as sb
@@ -54,6 +59,33 @@ def test_cloth_that_yields_may_touch():
 def test_gradients_of_cloth_on_a_ball_hold_against_independent_ones():
     report = sb.check_gradients(falling_cloth(), 0.03, swept(1e-3, 6))
     assert report.passed, str(report)
+
+
+BITS = """
+import hashlib, sys
+sys.path.insert(0, sys.argv[1])
+import numpy as np
+import sheetbend as sb
+from test_swept_contacts import falling_cloth, swept
+
+rollout = sb.rollout(falling_cloth(), [0.0, 0.03], swept(1e-3, 6))
+gradient = rollout.gradient(np.ones_like(rollout.positions)).inputs
+both = [rollout.positions, *(gradient[name] for name in sorted(gradient))]
+print(hashlib.sha256(b"".join(np.ascontiguousarray(a).tobytes() for a in both)).hexdigest())
+"""
+
+
+def test_motion_and_gradient_have_the_same_bits_with_every_instruction_set():
+    """Packs of contacts go through registers of two, four or eight numbers."""
+    found = {}
+    for isa in ("portable", "x86-64-v3", "x86-64-v4"):
+        command = [sys.executable, "-c", BITS, str(Path(__file__).parent)]
+        run = subprocess.run(command, env=os.environ | {"SHEETBEND_ISA": isa}, capture_output=True, text=True)
+        if run.returncode and "has no kernels" in run.stderr:
+            continue
+        assert run.returncode == 0, run.stderr
+        found[isa] = run.stdout
+    assert len(set(found.values())) == 1, found
 
 
 def test_bodies_and_pairs_are_sent_to_implicit():
