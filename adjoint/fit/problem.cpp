@@ -7,7 +7,7 @@
 #include <mutex>
 #include <set>
 
-#include "adjoint/equilibrium_tangents.h"
+#include "adjoint/equilibrium/equilibrium_tangents.h"
 #include "core/scalar/dual.h"
 #include "core/threads/pool.h"
 

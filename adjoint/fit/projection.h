@@ -11,7 +11,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "adjoint/corrected.h"
+#include "adjoint/fit/corrected.h"
 
 namespace sheetbend {
 

@@ -1,6 +1,6 @@
 #include <sheetbend/equilibrium.h>
 
-#include "adjoint/equilibrium_vjp.h"
+#include "adjoint/equilibrium/equilibrium_vjp.h"
 #include "adjoint/library/model.h"
 
 namespace sheetbend::v0 {

@@ -5,10 +5,10 @@
 #include <sheetbend/scene.h>
 #include <sheetbend/solver.h>
 
-#include "adjoint/equilibrium_tangents.h"
-#include "adjoint/experiment.h"
-#include "adjoint/parameter_map.h"
-#include "adjoint/tape_plan.h"
+#include "adjoint/equilibrium/equilibrium_tangents.h"
+#include "adjoint/observe/experiment.h"
+#include "adjoint/observe/parameter_map.h"
+#include "adjoint/tape/tape_plan.h"
 #include "core/solver/divergence.h"
 #include "core/solver/implicit_block.h"
 

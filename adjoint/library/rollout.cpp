@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "adjoint/library/model.h"
-#include "adjoint/rollout.h"
+#include "adjoint/rollout/rollout.h"
 #include "core/rollout/redundant_rows.h"
 
 namespace sheetbend::v0 {

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "adjoint/parameter_map.h"
+#include "adjoint/observe/parameter_map.h"
 #include "core/scene/scene.h"
 
 namespace sheetbend::library {

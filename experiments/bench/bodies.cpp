@@ -5,10 +5,10 @@
 #include <ctime>
 #include <functional>
 
-#include "adjoint/rollout.h"
+#include "adjoint/rollout/rollout.h"
+#include "core/scalar/vec3.h"
 #include "core/scene/scene.h"
 #include "core/solver/plan.h"
-#include "core/scalar/vec3.h"
 #include "tests/cpp/support/bodies.h"
 
 namespace sheetbend {
@@ -95,9 +95,11 @@ Times measure(const Hanging& it) {
   const Plan plan = make_plan(it.scene, {.h = h, .partition = Partition::direct, .iterations = 2});
   const double work = static_cast<double>(steps) * it.links;
   std::vector<double> x(it.scene.dofs()), x_bar(it.scene.dofs(), 1.0), bar(it.inputs.size());
-  const double forward = nanoseconds([&] { rollout_states<double>(it.scene, plan, it.inputs.data(), 0.0, {steps}, x.data(), nullptr); });
+  const double forward =
+      nanoseconds([&] { rollout_states<double>(it.scene, plan, it.inputs.data(), 0.0, {steps}, x.data(), nullptr); });
   const double gradient = nanoseconds([&] {
-    Tape<double> tape = record_rollout<double>(it.scene, plan, it.inputs.data(), 0.0, {steps}, x.data(), steps + 1, nullptr);
+    Tape<double> tape =
+        record_rollout<double>(it.scene, plan, it.inputs.data(), 0.0, {steps}, x.data(), steps + 1, nullptr);
     reverse_rollout<double>(it.scene, plan, it.inputs.data(), 0.0, tape, {steps}, x_bar.data(), bar.data(), nullptr);
   });
   return {forward / work, gradient / work};
@@ -108,12 +110,13 @@ Times measure(const Hanging& it) {
 
 int main() {
   using namespace sheetbend;
-  std::printf("%8s %12s %12s %12s %12s %12s\n", "links", "segment, ns", "body, ns", "body/segment", "gradient", "to 20 bodies");
+  std::printf("%8s %12s %12s %12s %12s %12s\n", "links", "segment, ns", "body, ns", "body/segment", "gradient",
+              "to 20 bodies");
   double first = 0.0;
   for (const int links : {20, 100, 1000}) {
     const Times segment = measure(rope(links)), body = measure(bodies(links));
     if (first == 0.0) first = body.forward;
-    std::printf("%8d %12.0f %12.0f %12.2f %12.2f %12.2f\n", links, segment.forward, body.forward, body.forward / segment.forward,
-                body.gradient / body.forward, body.forward / first);
+    std::printf("%8d %12.0f %12.0f %12.2f %12.2f %12.2f\n", links, segment.forward, body.forward,
+                body.forward / segment.forward, body.gradient / body.forward, body.forward / first);
   }
 }

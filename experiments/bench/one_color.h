@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "adjoint/rollout.h"
+#include "adjoint/rollout/rollout.h"
 #include "core/constraints/registry.h"
 #include "core/scene/scene.h"
 #include "core/solver/plan.h"

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <optional>
 
-#include "adjoint/equilibrium_vjp.h"
+#include "adjoint/equilibrium/equilibrium_vjp.h"
 #include "core/threads/pool.h"
 #include "python/bindings/core_module.h"
 #include "python/bindings/interrupt.h"

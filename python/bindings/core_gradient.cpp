@@ -1,6 +1,6 @@
 // Gradients from Python: tapes and what they will cost, VJPs, single and in lanes. `memory` is a budget in bytes, None without one. Shapes as in
 // core_rollout.cpp.
-#include "adjoint/rollout.h"
+#include "adjoint/rollout/rollout.h"
 #include "python/bindings/solver.h"
 
 namespace sheetbend::bindings {

@@ -1,5 +1,5 @@
 // The parameter map from Python: values of named quantities to inputs, cotangents and tangents through it.
-#include "adjoint/parameter_map.h"
+#include "adjoint/observe/parameter_map.h"
 
 #include "core/scalar/dual.h"
 #include "python/bindings/core_module.h"

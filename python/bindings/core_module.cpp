@@ -1,8 +1,8 @@
 // The module sheetbend._core: scenes, rollouts and their derivatives, equilibria, least-squares problems.
 #include "python/bindings/core_module.h"
 
-#include "adjoint/equilibrium_tangents.h"
-#include "adjoint/tape_plan.h"
+#include "adjoint/equilibrium/equilibrium_tangents.h"
+#include "adjoint/tape/tape_plan.h"
 #include "core/rollout/rollout.h"
 #include "python/bindings/interrupt.h"
 

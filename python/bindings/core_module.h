@@ -1,7 +1,7 @@
 // The parts of sheetbend._core, one file each.
 #pragma once
 
-#include "adjoint/parameter_map.h"
+#include "adjoint/observe/parameter_map.h"
 #include "python/bindings/arrays.h"
 
 namespace sheetbend::bindings {

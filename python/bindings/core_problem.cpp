@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "adjoint/fit/evaluation.h"
-#include "adjoint/settled.h"
+#include "adjoint/observe/settled.h"
 #include "python/bindings/interrupt.h"
 #include "python/bindings/solver.h"
 

@@ -3,8 +3,8 @@
 #include <functional>
 #include <numeric>
 
-#include "adjoint/rollout.h"
-#include "adjoint/settled.h"
+#include "adjoint/observe/settled.h"
+#include "adjoint/rollout/rollout.h"
 #include "core/rollout/contact_counts.h"
 #include "core/rollout/redundant_rows.h"
 #include "python/bindings/solver.h"
@@ -117,7 +117,7 @@ std::vector<std::vector<std::vector<double>>> force_balance(const Solver& s, con
   return all;
 }
 
-// Where a start that settles (adjoint/settled.h) begins: (dofs,).
+// Where a start that settles (adjoint/observe/settled.h) begins: (dofs,).
 py::array_t<double> settled(const Solver& s, const Array& inputs, double t0) {
   expect_size(inputs, s.scene->layout.total(), "inputs");
   auto out = empty({static_cast<std::size_t>(s.scene->dofs())});

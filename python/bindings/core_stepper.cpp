@@ -1,7 +1,7 @@
 // Single substeps from Python, forward, reverse and tangents, of batches in lanes. A state is a row (x, x_before, v, v_before, substep, impact): four
 // times dofs numbers, and two whole ones without derivatives: which substep it is after, and how many of BDF1 an impact has left before it. Shapes:
 // states (B, width), inputs (B, total).
-#include "adjoint/single_step.h"
+#include "adjoint/rollout/single_step.h"
 
 #include <algorithm>
 #include <map>

@@ -6,7 +6,7 @@
 #include <ranges>
 #include <span>
 
-#include "adjoint/rollout.h"
+#include "adjoint/rollout/rollout.h"
 #include "core/scalar/complex.h"
 #include "core/scalar/dual.h"
 #include "python/bindings/solver.h"

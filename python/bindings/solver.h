@@ -7,7 +7,7 @@
 #include <optional>
 #include <utility>
 
-#include "adjoint/tape_plan.h"
+#include "adjoint/tape/tape_plan.h"
 #include "core/scalar/pack.h"
 #include "core/solver/plan.h"
 #include "core/threads/pool.h"

@@ -1,7 +1,7 @@
 // Bodies: what their axes add to a scene, and oracles of rigid motion.
 #include <gtest/gtest.h>
 
-#include "adjoint/rollout.h"
+#include "adjoint/rollout/rollout.h"
 #include "core/equilibrium/equilibrium.h"
 #include "core/scalar/complex.h"
 #include "tests/cpp/support/bodies.h"

@@ -5,7 +5,7 @@
 #include <limits>
 #include <random>
 
-#include "adjoint/cloud.h"
+#include "adjoint/observe/cloud.h"
 #include "core/scalar/complex.h"
 #include "core/scalar/dual.h"
 

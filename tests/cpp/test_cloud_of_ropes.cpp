@@ -5,7 +5,7 @@
 #include <limits>
 #include <random>
 
-#include "adjoint/cloud_of_ropes.h"
+#include "adjoint/observe/cloud_of_ropes.h"
 #include "core/scalar/complex.h"
 #include "core/scalar/dual.h"
 

@@ -1,7 +1,7 @@
 // Static equilibrium: discrete and continuous closed forms, stability, and starts far away.
 #include <gtest/gtest.h>
 
-#include "adjoint/equilibrium_vjp.h"
+#include "adjoint/equilibrium/equilibrium_vjp.h"
 #include "core/equilibrium/branches.h"
 #include "tests/cpp/support/compare.h"
 #include "tests/cpp/support/ropes.h"

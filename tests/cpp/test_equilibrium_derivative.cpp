@@ -1,7 +1,7 @@
 // The implicit derivative of an equilibrium: against its own residual, its transpose, and equilibria solved again.
 #include <gtest/gtest.h>
 
-#include "adjoint/equilibrium_vjp.h"
+#include "adjoint/equilibrium/equilibrium_vjp.h"
 #include "core/equilibrium/residual.h"
 #include "tests/cpp/support/case.h"
 #include "tests/cpp/support/compare.h"

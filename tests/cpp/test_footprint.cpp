@@ -3,8 +3,8 @@
 #include <cstdlib>
 #include <new>
 
-#include "adjoint/footprint.h"
-#include "adjoint/tape_plan.h"
+#include "adjoint/tape/footprint.h"
+#include "adjoint/tape/tape_plan.h"
 #include "core/scalar/dual.h"
 #include "tests/cpp/support/bipyramid.h"
 #include "tests/cpp/support/contact_scenes.h"

@@ -1,7 +1,7 @@
 // Joints between bodies: oracles of pendulums and springs, mechanisms with rows too many, and the gradients of all their numbers.
 #include <gtest/gtest.h>
 
-#include "adjoint/rollout.h"
+#include "adjoint/rollout/rollout.h"
 #include "core/rollout/redundant_rows.h"
 #include "core/scalar/complex.h"
 #include "tests/cpp/support/bodies.h"

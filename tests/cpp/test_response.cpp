@@ -5,7 +5,7 @@
 #include <numeric>
 #include <random>
 
-#include "adjoint/response.h"
+#include "adjoint/fit/response.h"
 
 namespace sheetbend {
 namespace {

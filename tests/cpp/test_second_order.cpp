@@ -1,5 +1,5 @@
 // Forward over reverse: the reverse on dual numbers gives Hessian-vector products.
-#include "adjoint/rollout_impl.h"
+#include "adjoint/rollout/rollout_impl.h"
 #include "core/scalar/complex.h"
 #include "tests/cpp/support/programs.h"
 

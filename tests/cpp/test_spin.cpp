@@ -1,7 +1,7 @@
 // Bodies that keep their spin, and loads along rows: oracles of fast turns, and gradients.
 #include <gtest/gtest.h>
 
-#include "adjoint/rollout.h"
+#include "adjoint/rollout/rollout.h"
 #include "core/rollout/rollout.h"
 #include "core/scalar/complex.h"
 #include "tests/cpp/support/bodies.h"

@@ -1,6 +1,6 @@
 // Substeps of more stages than ours, as CONTRIBUTING.md describes them: a force along x, and a set that every substep finds anew, whose entries keep a
 // value from one substep to the next.
-#include "adjoint/footprint.h"
+#include "adjoint/tape/footprint.h"
 #include "tests/cpp/support/contact_scenes.h"
 #include "tests/cpp/support/lanes.h"
 #include "tests/cpp/support/substeps.h"

@@ -1,5 +1,5 @@
 // What force sensors read along rollouts: values with tangents have the bits of those without, and the tangents are those of the complex step.
-#include "adjoint/force_sensor.h"
+#include "adjoint/observe/force_sensor.h"
 #include "core/rollout/rollout.h"
 #include "core/scalar/complex.h"
 #include "core/scalar/dual.h"

@@ -247,7 +247,7 @@ def _observe(
 
 def _of_loss(e: Experiment, d: Array, by: Array) -> Array:
     """(n, axes) what a change `by` of markers' weighted distances d, both (n, axes), makes of their residuals, which a
-    robust loss shortens (adjoint/observation.h). By complex step."""
+    robust loss shortens (adjoint/observe/observation.h). By complex step."""
     if e.loss == "squares":
         return by
     moved = d + 1e-30j * by

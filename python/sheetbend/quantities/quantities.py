@@ -3,7 +3,7 @@
 An input (a compliance, a mass, a rest length, a coordinate) is a sum of terms, each a coefficient times a product of
 simple functions of named quantities: a link's compliance is `length/segments * 1/EA`. Fields that must stay positive
 have exponentials of weighted quantities among the factors. The map and its derivative are compiled
-(adjoint/parameter_map.h).
+(adjoint/observe/parameter_map.h).
 """
 
 from __future__ import annotations

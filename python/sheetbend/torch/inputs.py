@@ -31,7 +31,7 @@ _TORCH: Mapping[str, Callable[[Tensor], Tensor]] = {
 
 class ParameterMap:
     """inputs[target] = base[target] + sum of coefficient * prod f(weight * theta), in the order of
-    adjoint/parameter_map.h; only exponentials have weights other than one.
+    adjoint/observe/parameter_map.h; only exponentials have weights other than one.
 
     Plain torch operations, so every transform differentiates and batches it by itself.
     """

@@ -5,7 +5,7 @@
 #include <limits>
 #include <numeric>
 
-#include "adjoint/rollout.h"
+#include "adjoint/rollout/rollout.h"
 #include "tests/cpp/support/random_scene.h"
 
 namespace sheetbend::testing {

@@ -1,7 +1,7 @@
 // One substep of a list of stages as a function theta = (x, x_before, v, v_before, inputs) -> (x, v), and its reverse.
 #pragma once
 
-#include "adjoint/rollout_vjp.h"
+#include "adjoint/rollout/rollout_vjp.h"
 #include "adjoint/step/substep.h"
 #include "core/scalar/complex.h"
 #include "tests/cpp/support/programs.h"
