@@ -166,7 +166,8 @@ class Profiles:
 
     def _part(self, name: str) -> FitProblem:
         if name not in self._parts:
-            self._parts[name] = self._problem.around(name)
+            part = self._problem.around(name)
+            self._parts |= dict.fromkeys(part.parameters.free, part)  # which is tied to the others as they are to it
         return self._parts[name]
 
     def _nearest(self, held: FitProblem, part: FitProblem, name: str, at: float) -> tuple[Array, float]:
