@@ -1,15 +1,16 @@
 """Three rigid bodies on hinges, as twins of a triple pendulum: inertia, centers and viscosities from swings.
 
-    python experiments/triple_pendulum/triple.py [--draws 1]
+    python experiments/triple_pendulum/triple.py [--draws 1] [--dry]
 
 The recordings come from the equations of Lagrange in the three angles, integrated by an explicit method of eighth
 order, not from the simulator. Each draw of the noise is fitted to two pieces, and two others are predicted from their
-first samples.
+first samples. With --dry the hinges have dry friction in place of viscosity.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 
 import numpy as np
 import sheetbend as sb
@@ -18,6 +19,7 @@ from scipy.integrate import solve_ivp
 MASS, LENGTH = np.array([0.23, 0.25, 0.22]), np.array([0.17, 0.17, 0.17])  # kg, m from hinge to hinge
 CENTER, MOMENT = np.array([0.10, 0.10, 0.08]), np.array([1.0e-3, 1.1e-3, 0.9e-3])  # m, kg m^2 about the centers
 VISCOSITY = np.array([4e-4, 3e-4, 3e-4])  # N m s/rad
+FRICTION, SLIP = np.array([2e-3, 1.5e-3, 1e-3]), 1e-3  # N m; rad, up to which a dry hinge gives elastically
 NOISE = 3e-4  # m, of each coordinate of a marker
 RATE, SECONDS, FIRST = 100, 1.5, 0.3  # Hz; s of a piece; s from which a piece is predicted
 STARTS = {  # rad and rad/s of each arm, from straight down
@@ -26,37 +28,81 @@ STARTS = {  # rad and rad/s of each arm, from straight down
     "predicted 1": [1.2, 0.8, 0.5, -1.0, 0.0, 1.5],
     "predicted 2": [0.4, -0.9, -1.2, 0.0, 1.0, 0.0],
 }
-SOLVER = sb.Solver(h=1 / 200, extrapolate=3)
-TRUTH = {
-    **{f"arm{k}_inertia_3": MOMENT[k] for k in range(3)},
-    "arm0_center_x": CENTER[0],
-    "arm1_center_x": CENTER[1],
-    **{f"hinge{k}_viscosity": VISCOSITY[k] for k in range(3)},
-}
-"""What a swing shows beside the masses and the last arm's center, which set the scale."""
+SOLVERS = {"viscosity": sb.Solver(h=1 / 200, extrapolate=3), "friction": sb.Solver(h=1 / 4800)}
+"""By what the hinges have: extrapolation in time refuses dry friction, which is not smooth."""
 BEGIN = (1.3, 0.8, 1.3, 0.9, 1.1, 2.0, 0.5, 2.0)  # times the truth, where the fit starts
 OFF = np.full(6, 0.03)  # rad and rad/s, by which angles and rates are off where the fit starts
 OWN = {f"hinge{k}_{key}": unit for key, unit in (("angle", "rad"), ("rate", "rad/s")) for k in range(3)}
 PLACES = [(0.5, 0.02), (1.0, 0.0)]  # of markers, in parts of an arm's length and m across it
 
 
-def slope(_: float, y: np.ndarray) -> np.ndarray:
-    """Rates of angles and rates."""
-    angles, rates = y[:3], y[3:]
+def truth(law: str) -> dict[str, float]:
+    """What a swing shows beside the masses and the last arm's center, which set the scale."""
+    resists = FRICTION if law == "friction" else VISCOSITY
+    return {
+        **{f"arm{k}_inertia_3": MOMENT[k] for k in range(3)},
+        "arm0_center_x": CENTER[0],
+        "arm1_center_x": CENTER[1],
+        **{f"hinge{k}_{law}": resists[k] for k in range(3)},
+    }
+
+
+def slope(y: np.ndarray, resists: np.ndarray) -> np.ndarray:
+    """Rates of angles and rates under the torques (3,) with which the hinges resist."""
+    angles, rates = y[:3], y[3:6]
     arms = np.tril(np.tile(LENGTH, (3, 1)), -1) + np.diag(CENTER)  # of each center, to each angle
     coupled = np.einsum("i,ij,ik->jk", MASS, arms, arms)
     apart = angles[:, None] - angles
-    drag = VISCOSITY * np.diff(rates, prepend=0.0)
-    torque = -(coupled * np.sin(apart)) @ rates**2 - 9.81 * (MASS @ arms) * np.sin(angles) - drag
-    torque[:-1] += drag[1:]
+    torque = -(coupled * np.sin(apart)) @ rates**2 - 9.81 * (MASS @ arms) * np.sin(angles) - resists
+    torque[:-1] += resists[1:]
     return np.concatenate([rates, np.linalg.solve(coupled * np.cos(apart) + np.diag(MOMENT), torque)])
 
 
-def swing(start: list[float]) -> np.ndarray:
+def relative(rates: np.ndarray) -> np.ndarray:
+    return np.diff(rates, prepend=0.0)
+
+
+def swing(start: list[float], law: str) -> np.ndarray:
     """(frames, 3) rad, the angles of a piece."""
     t = np.arange(round(SECONDS * RATE) + 1) / RATE
-    found = solve_ivp(slope, (0.0, SECONDS), start, method="DOP853", t_eval=t, rtol=1e-12, atol=1e-12)
+    if law == "friction":
+        return dry_swing(start, t)
+    found = solve_ivp(
+        lambda _, y: slope(y, VISCOSITY * relative(y[3:])), (0.0, SECONDS), start,
+        method="DOP853", t_eval=t, rtol=1e-12, atol=1e-12,
+    )  # fmt: skip
     return np.asarray(found.y[:3].T)
+
+
+def dry_swing(start: list[float], t: np.ndarray) -> np.ndarray:
+    """The same with dry friction: each hinge has given elastically by y[6:], up to SLIP, and slides beyond. Integrated
+    from one change to the next."""
+    y, at, slides, angles = np.concatenate([start, np.zeros(3)]), 0.0, np.zeros(3, dtype=bool), np.empty((len(t), 3))
+
+    def changes(k: int) -> Callable[[float, np.ndarray], float]:
+        def event(_: float, y: np.ndarray) -> float:
+            onward = relative(y[3:6])[k] * np.sign(y[6 + k])
+            return float(onward if slides[k] else SLIP - abs(y[6 + k]))
+
+        event.terminal, event.direction = True, -1.0  # type: ignore[attr-defined]
+        return event
+
+    def moves(_: float, y: np.ndarray) -> np.ndarray:
+        return np.concatenate([slope(y, FRICTION / SLIP * y[6:]), np.where(slides, 0.0, relative(y[3:6]))])
+
+    events = [changes(k) for k in range(3)]
+    while at < SECONDS:
+        piece = solve_ivp(
+            moves, (at, SECONDS), y, method="DOP853", events=events, dense_output=True,
+            rtol=1e-11, atol=1e-12, max_step=5e-3,
+        )  # fmt: skip
+        at, y = piece.t[-1], piece.y[:, -1]
+        for frame in np.flatnonzero((t >= piece.t[0]) & (t <= at)):
+            angles[frame] = piece.sol(t[frame])[:3]
+        for k in (k for k in range(3) if len(piece.t_events[k])):
+            slides[k] = not slides[k]
+            y[6 + k] = np.sign(y[6 + k]) * SLIP * (1.0 if slides[k] else 1.0 - 1e-12)
+    return angles
 
 
 def along(angles: np.ndarray) -> np.ndarray:
@@ -71,10 +117,10 @@ def markers(angles: np.ndarray) -> np.ndarray:
     return np.stack(on, axis=2).reshape(len(angles), -1, 3)
 
 
-def scene_of(start: np.ndarray, values: dict[str, float]) -> tuple[sb.Scene, list[sb.Place]]:
+def scene_of(start: np.ndarray, values: dict[str, float], law: str) -> tuple[sb.Scene, list[sb.Place]]:
     """Three bodies on hinges about y, and where their markers are."""
     scene, top, upper, places = sb.Scene("triple pendulum"), np.zeros(3), None, []
-    rates = np.diff(start[3:], prepend=0.0)
+    rates = relative(start[3:])
     for k in range(3):
         d, across = along(start[k]), along(start[k] + np.pi / 2.0)
         moment = values[f"arm{k}_inertia_3"]
@@ -86,41 +132,41 @@ def scene_of(start: np.ndarray, values: dict[str, float]) -> tuple[sb.Scene, lis
             at=top,
             rotation=np.stack([d, across, [0.0, -1.0, 0.0]], axis=1),
         )
-        viscosity = values[f"hinge{k}_viscosity"]
-        sb.hinge(upper, arm, at=top, axis=(0.0, -1.0, 0.0), name=f"hinge{k}", rate=rates[k], viscosity=viscosity)
+        resists = {law: values[f"hinge{k}_{law}"]} | ({"slip_angle": SLIP} if law == "friction" else {})
+        sb.hinge(upper, arm, at=top, axis=(0.0, -1.0, 0.0), name=f"hinge{k}", rate=rates[k], **resists)
         upper, top = arm, top + LENGTH[k] * d
         places += sb.on_body(arm, [(part * LENGTH[k], off, 0.0) for part, off in PLACES])
     return scene, places
 
 
-def experiment(name: str, x: np.ndarray) -> sb.Experiment:
+def experiment(name: str, x: np.ndarray, law: str) -> sb.Experiment:
     """A piece; of one that is predicted, the first samples alone are data."""
-    begin = {key: value * share for (key, value), share in zip(TRUTH.items(), BEGIN, strict=True)}
-    scene, places = scene_of(np.array(STARTS[name]) + OFF, begin)
+    begin = {key: value * share for (key, value), share in zip(truth(law).items(), BEGIN, strict=True)}
+    scene, places = scene_of(np.array(STARTS[name]) + OFF, begin, law)
     seen = sb.Recording(x, np.arange(len(x)) / RATE, name=name)
     part = {"fit": (0.0, FIRST), "held_out": (FIRST, SECONDS)} if name.startswith("predicted") else {}
     return sb.Experiment(
-        scene=scene, recording=seen, markers=places, solver=SOLVER, start_time=0.0, sigma=NOISE, name=name, **part
+        scene=scene, recording=seen, markers=places, solver=SOLVERS[law], start_time=0.0, sigma=NOISE, name=name, **part
     )
 
 
-def fitted(pieces: dict[str, np.ndarray]) -> sb.FitResult:
+def fitted(pieces: dict[str, np.ndarray], law: str) -> sb.FitResult:
     own = [sb.Parameter(name=name, private=True, unit=unit, scale=0.1) for name, unit in OWN.items()]
-    experiments = [experiment(name, x) for name, x in pieces.items()]
-    return sb.fit(experiments, parameters=[*TRUTH, *own], windows=[], refine=False, profiles=False)
+    experiments = [experiment(name, x, law) for name, x in pieces.items()]
+    return sb.fit(experiments, parameters=[*truth(law), *own], windows=[], refine=False, profiles=False)
 
 
-def missed(result: sb.FitResult, clean: dict[str, np.ndarray]) -> dict[str, float]:
+def missed(result: sb.FitResult, clean: dict[str, np.ndarray], law: str) -> dict[str, float]:
     """Of each predicted piece, the rms distance along one coordinate between predicted and noisy markers in the plane,
     after its first samples, over the noise."""
     found = {}
     for name, x in clean.items():
         if not name.startswith("predicted"):
             continue
-        values = {key: result.values[key] for key in TRUTH}
+        values = {key: result.values[key] for key in truth(law)}
         values |= {key: result.values[f"{key}[{name}]"] for key in OWN}
-        scene, places = scene_of(np.array(STARTS[name]) + OFF, values)
-        motion = sb.simulate(scene, np.arange(len(x)) / RATE, SOLVER, {key: values[key] for key in OWN})
+        scene, places = scene_of(np.array(STARTS[name]) + OFF, values, law)
+        motion = sb.simulate(scene, np.arange(len(x)) / RATE, SOLVERS[law], {key: values[key] for key in OWN})
         x_found = []
         for place in places:
             origin, frame = place.body.pose(motion)
@@ -130,16 +176,16 @@ def missed(result: sb.FitResult, clean: dict[str, np.ndarray]) -> dict[str, floa
     return found
 
 
-def main(draws: int) -> None:
-    clean = {name: markers(swing(start)) for name, start in STARTS.items()}
-    rng = np.random.default_rng(1)
-    inside, off = dict.fromkeys(TRUTH, 0), []
+def main(draws: int, law: str) -> None:
+    clean = {name: markers(swing(start, law)) for name, start in STARTS.items()}
+    rng, true = np.random.default_rng(1), truth(law)
+    inside, off = dict.fromkeys(true, 0), []
     for draw in range(draws):
         noisy = {name: x + NOISE * rng.standard_normal(x.shape) for name, x in clean.items()}
-        result = fitted(noisy)
-        off.append(list(missed(result, clean).values()))
+        result = fitted(noisy, law)
+        off.append(list(missed(result, clean, law).values()))
         outside = []
-        for name, value in TRUTH.items():
+        for name, value in true.items():
             one = result[name]
             holds = one.lower is not None and one.upper is not None and bool(one.lower <= value <= one.upper)
             inside[name] += holds
@@ -156,4 +202,6 @@ def main(draws: int) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--draws", type=int, default=1)
-    main(parser.parse_args().draws)
+    parser.add_argument("--dry", action="store_true", help="dry friction in the hinges, not viscosity")
+    given = parser.parse_args()
+    main(given.draws, "friction" if given.dry else "viscosity")
