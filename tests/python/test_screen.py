@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import io
 import json
+import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -85,3 +88,28 @@ def test_a_defect_keeps_the_json_line(config: Path, monkeypatch: pytest.MonkeyPa
     result = run("simulate", config, "--json")
     assert result.exit_code == 1 and "of ours" in json.loads(result.stdout)["error"]["message"]
     assert "Traceback" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("reader", "arguments", "code", "said"),
+    [
+        ("head -c 0", [], 0, ""),
+        ("head -c 0", ["--json"], 0, ""),
+        ("cat > /dev/full", [], 0, ""),
+        (None, [], 0, "stdout cannot be written"),
+        (None, ["--json"], 2, "stdout cannot be written"),
+    ],
+)
+def test_a_stdout_that_nobody_reads_or_that_is_full(
+    config: Path, reader: str | None, arguments: list[str], code: int, said: str
+) -> None:
+    """The command goes on and writes its results: a fit may have taken hours."""
+    config.write_text(ROPE + '[output]\nfigures = "none"\n')
+    command = shlex.join([sys.executable, "-m", "sheetbend", "fit", str(config), "-o", "out", *arguments])
+    where = "> /dev/full" if reader is None else f"| {reader}"
+    done = subprocess.run(
+        ["bash", "-c", f"{command} {where}; exit ${{PIPESTATUS[0]}}"], cwd=config.parent, capture_output=True, text=True
+    )
+    assert done.returncode == code, done.stderr
+    assert (config.parent / "out" / "fit.json").is_file() and not (config.parent / "out" / "journal.sqlite").exists()
+    assert said in done.stderr and "Traceback" not in done.stderr and "Exception ignored" not in done.stderr

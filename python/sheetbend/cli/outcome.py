@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -19,7 +20,7 @@ from ..files.door import noting
 from ..optional import MissingExtraError
 from ..report.fit_result import FitResult
 from .notices import noticed
-from .screen import Screen
+from .screen import Screen, silence
 from .stopping import Stopping
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")]
@@ -71,8 +72,20 @@ def run(command: Callable[[Console], Outcome], as_json: bool) -> None:
     if outcome.code is Code.INTERRUPTED and stopping.terminated:
         outcome = replace(outcome, code=Code.TERMINATED)
     if as_json:
-        print(json.dumps(strict({**outcome.data, "exit_code": int(outcome.code)}), allow_nan=False), flush=True)
+        outcome = _told(outcome)
     raise typer.Exit(int(outcome.code))
+
+
+def _told(outcome: Outcome) -> Outcome:
+    """An outcome after it was printed as JSON; bad input where stdout is full."""
+    try:
+        print(json.dumps(strict({**outcome.data, "exit_code": int(outcome.code)}), allow_nan=False), flush=True)
+    except OSError as error:
+        silence(sys.stdout)
+        if not isinstance(error, BrokenPipeError):
+            _complain(f"stdout cannot be written: {error.strerror}", [])
+            return replace(outcome, code=Code.BAD_INPUT)
+    return outcome
 
 
 def code_of(results: Sequence[FitResult], strictly: bool) -> Code:

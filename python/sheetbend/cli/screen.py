@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable
-from typing import Any
+from contextlib import suppress
+from typing import IO, Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
@@ -21,6 +23,21 @@ class Screen(Console):
     def __init__(self, stderr: bool = False, width: int | None = None) -> None:
         super().__init__(stderr=stderr, width=width, highlight=False, markup=False, emoji=False)
 
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print as rich does; a command whose stream is full goes on, and says so on stderr."""
+        try:
+            super().print(*objects, **options)
+        except OSError as error:
+            self.quiet = True
+            silence(self.file)
+            if not self.stderr:
+                Screen(stderr=True).print(f"stdout cannot be written: {error.strerror}; the command goes on without it")
+
+    def on_broken_pipe(self) -> None:
+        """Go on where nobody reads any more, as behind `| head`: results are still to be written."""
+        self.quiet = True
+        silence(self.file)
+
     def render_str(self, text: str, **options: Any) -> Text:
         """Render the text with control characters spelled out, so that columns are as wide as what they show."""
         return super().render_str(spelled(text), **options)
@@ -29,6 +46,14 @@ class Screen(Console):
         """Render as rich does, with control characters of every segment spelled out."""
         for segment in super().render(renderable, options):
             yield segment if segment.control else segment._replace(text=spelled(segment.text))
+
+
+def silence(stream: IO[str]) -> None:
+    """Let what is written to a stream from now on, or still waits in it, go nowhere."""
+    with suppress(OSError, ValueError):  # no file, as in tests
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)
 
 
 def heading(console: Console, name: str, about: str, above: str = "") -> None:
