@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -17,7 +18,9 @@ import pytest
 import sheetbend as sb
 from commands import last_line, run
 from sheetbend import cli
+from sheetbend.cli.app import app
 from sheetbend.motion.gradient_report import GradientReport, GradientRow
+from typer.testing import CliRunner
 
 ROPE = """\
 [experiment]
@@ -462,3 +465,26 @@ def test_bench_says_where_it_went() -> None:
     found = run("bench", "W2", "--threads", 2, "--json")
     assert found.exit_code == 2
     assert "python experiments/bench/measure.py W2 --threads 2" in last_line(found)["error"]["fix"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["new", "take.csv", "--density", "50g/m"], "--density: must be a number (got '50g/m'). Fix: write the number"),
+        (["new", "take.csv", "--density", "0,05"], "Fix: write 0.05, with a point as decimal mark."),
+        (["new", "take.csv", "--length=abc"], "--length: must be a number (got 'abc'). Fix: give a number."),
+        (["fit", "my.toml", "--workers", "two"], "--workers: must be a whole number (got 'two')"),
+        (["identify", "my.toml", "--noise", "1mm"], "without its unit"),
+    ],
+)
+def test_numbers_of_options_say_what_they_got(arguments: list[str], words: str) -> None:
+    """Only that a text could not be parsed was said, without the text."""
+    done = CliRunner().invoke(app, arguments)
+    shown = " ".join(re.sub(r"[\u2500-\u257f]", " ", done.output).split())
+    assert done.exit_code == 2 and words in shown, done.output
+
+
+def test_numbers_of_options_are_read_as_before() -> None:
+    done = CliRunner().invoke(app, ["new", "none.csv", "--density", "-1e-3"])
+    assert "--density: must be positive" in done.output
+    assert "no file" in CliRunner().invoke(app, ["new", "none.csv", "--density=.5"]).output

@@ -206,7 +206,10 @@ def test_zeros_of_a_trc_file_are_lost_markers(tmp_path: Path) -> None:
     assert np.flatnonzero(~Recording.load(tmp_path / "take.trc").mask[:, 0]).tolist() == [7, 8]
 
 
-@pytest.mark.parametrize(("name", "words"), [("take.mat", "loadmat"), ("take.bag", "export the poses as CSV")])
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("take.mat", "loadmat"), ("take.bag", "export the poses as CSV"), ("a.toml", "is a configuration")],
+)
 def test_files_that_are_not_read_say_how_to_convert_them(tmp_path: Path, name: str, words: str) -> None:
     (tmp_path / name).write_bytes(b"x")
     with pytest.raises(RecordingError, match=rf"suffix that no reader knows.*{words}"):

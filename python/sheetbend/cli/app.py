@@ -15,6 +15,7 @@ from .fit import fit
 from .identify import identify
 from .info import info
 from .new import new
+from .number_options import saying_numbers
 from .schema import schema
 from .simulate import simulate
 from .textile import textile
@@ -49,5 +50,5 @@ def options(
 
 
 for command in (new, fit, simulate, view, check, info, identify, compare, collect, textile, fabric, schema):
-    app.command()(command)
+    app.command(cls=saying_numbers(command))(command)
 app.command(hidden=True, context_settings={"ignore_unknown_options": True})(bench)

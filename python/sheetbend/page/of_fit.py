@@ -87,7 +87,7 @@ def result_page(
         title=title,
         about=about,
         headline=headline(result),
-        message=result.message,
+        message="" if result.converged else result.message,
         tone=_tone(result),
         counts=_counts(result),
         first=[part for part in told if part["title"] in _FIRST],

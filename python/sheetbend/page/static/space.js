@@ -139,7 +139,7 @@ class Space {
   }
 
   ticks(part) {
-    const tone = part.name === "twist" ? "warm" : "gray"; // any other name is a collider's
+    const tone = part.name === "twist" ? "warm" : "ink"; // any other name is a body's or a collider's
     const object = this.segments(part.nodes / 2, tone), position = object.geometry.attributes.position;
     const at = (frame) => {
       position.array.set(part.places.subarray(3 * frame * part.nodes, 3 * (frame + 1) * part.nodes));

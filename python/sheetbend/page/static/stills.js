@@ -39,7 +39,7 @@ class Stills {
 
   // Twist of rods, and the outlines of what they touch.
   ticks(pen, at, part, frame) {
-    pen.strokeStyle = color(part.name === "twist" ? "warm" : "gray");
+    pen.strokeStyle = color(part.name === "twist" ? "warm" : "ink");
     pen.beginPath();
     for (let n = 0; n < part.nodes; n += 2) {
       pen.moveTo(...at(part.places, 3 * (frame * part.nodes + n)));

@@ -36,6 +36,7 @@ FORMATS: dict[str, ModuleType] = {
 ELSEWHERE = {
     ".mat": "in Python: np.savez('take.npz', positions=..., times=...) of what scipy.io.loadmat gives, or in MATLAB: "
     "writetable to a .csv with the columns time,tip_x,tip_y,tip_z,...",
+    ".toml": "it is a configuration: give it to `sheetbend fit`, simulate or info",
     ".xlsx": "save the sheet as CSV",
     ".xls": "save the sheet as CSV",
     ".bag": "export the poses as CSV, as `rostopic echo -p` does",

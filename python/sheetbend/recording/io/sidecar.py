@@ -155,7 +155,7 @@ def _meters(units: Any) -> float:
     length = units.split(",")[0].strip() if isinstance(units, str) else None
     if length not in METERS:
         known = ", ".join(METERS)
-        fix = f"start with one of {known}, in the JSON beside the file or by units="
+        fix = f"use one of {known}, in the JSON beside the file or as units="
         raise RecordingError("units", "names no known length unit", units, fix)
     return METERS[length]
 
