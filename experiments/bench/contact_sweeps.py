@@ -28,7 +28,7 @@ def cloth(case: str, columns: int) -> sb.Scene:
     lying = np.asarray(mesh.vertices) + np.array([0.0, 0.0, height])
     built = sb.add_cloth(scene, mesh, "cloth", positions=lying, density=0.2, warp=40.0, shear=10.0, bending=1e-5)
     if case != "without":
-        scene.contact(built, sb.Plane(name="table"), friction=0.3)
+        scene.add_contact(built, sb.Plane(name="table"), friction=0.3)
     return scene
 
 
