@@ -15,7 +15,8 @@ from sheetbend.quantities.quantities import Term, product
 CONFIG = Path(__file__).with_name("beam.toml")
 SIDE, DENSITY, POISSON = 0.03, 1070.0, 0.499  # m, kg/m^3; silicone
 E, DAMPING, TILT = 3.0e5, 0.1 / (2 * np.pi * 7.7), 0.113  # Pa, s, rad, where the fits start
-RUNS = (("pinned", (7, 2, 2)), ("pinned", (10, 3, 3)), ("narrows", (7, 2, 2)))  # clamps and meshes
+CLAMPS = ("pinned", "narrows")
+MESHES = ((7, 2, 2), (10, 3, 3))
 SOLVER = sb.Solver(h=2.5e-3, method="newton")
 FAR = 1.0  # m, of the anchors of links along which a particle keeps its place
 SIDEWAYS = 0.01  # m/N, of each link that keeps a face's side: a fortieth of what would keep it from narrowing
@@ -128,7 +129,7 @@ def loaded_frequency(study, cells, values, clamp="pinned", hung=0.052, seconds=1
 if __name__ == "__main__":
     study = load(CONFIG)
     print("clamp | bricks | E, 95 % interval | damping | cost | rest | fall | next second | loaded", flush=True)
-    for clamp, cells in RUNS:
+    for clamp, cells in ((clamp, cells) for clamp in CLAMPS for cells in MESHES):
         found = fitted(study, cells, clamp)
         rest, fall = (next(r for r in found.result.recordings if r.name == part) for part in ("rest", "fall"))
         stiff, damping = found["beam_E"], found["beam_damping"]
