@@ -1,6 +1,7 @@
 """The bare beam as a solid of bricks: E beside that of the rod with shear, and the loaded run's frequency from it.
 
-Run from the repository's root: python experiments/beam/solid.py. It prints the table of the README, in a minute.
+Run from the repository's root: python experiments/beam/solid.py. It prints the table of the README, in a few minutes:
+for a face whose particles are pinned, and for one that stays plane but may narrow.
 """
 
 from dataclasses import replace
@@ -14,11 +15,33 @@ from sheetbend.quantities.quantities import Term, product
 CONFIG = Path(__file__).with_name("beam.toml")
 SIDE, DENSITY, POISSON = 0.03, 1070.0, 0.499  # m, kg/m^3; silicone
 E, DAMPING, TILT = 3.0e5, 0.1 / (2 * np.pi * 7.7), 0.113  # Pa, s, rad, where the fits start
+CLAMPS = ("pinned", "narrows")
 MESHES = ((7, 2, 2), (10, 3, 3))
 SOLVER = sb.Solver(h=2.5e-3, method="newton")
+FAR = 1.0  # m, of the anchors of links along which a particle keeps its place
+SIDEWAYS = 0.01  # m/N, of each link that keeps a face's side: a fortieth of what would keep it from narrowing
 
 
-def scene(section, gravity, cells, pulled, hung=0.0):
+def narrowing(out, mesh, beam, face, origin):
+    """Hold a face that may narrow: its particles stay in its plane, at the ends of rigid links to anchors far along the
+    beam. Its four corners keep their height, which bending changes alike for all of them. Soft links keep its side.
+
+    Returns the anchors, placed across the beam alone, and their places in the beam's axes."""
+    v = mesh.vertices
+    corners = face[(np.abs(v[face][:, 1:]) > SIDE / 2 - 1e-9).all(axis=1)]
+    anchors, places = [], []
+    for axis, own, soft in ((0, face, 0.0), (2, corners, 0.0), (1, face, SIDEWAYS)):
+        away = v[own] - FAR * np.eye(3)[axis]
+        anchor = out.add_hidden(origin + away * [0.0, 1.0, 0.0], 1.0, pinned=True)
+        pairs = np.column_stack([beam.particles[own], anchor])
+        rest = np.full(len(own), FAR)
+        out.add_constraints("distance", pairs, name=f"held_{'xyz'[axis]}", rest=rest, compliance=soft)
+        anchors.append(anchor)
+        places.append(away)
+    return np.concatenate(anchors), np.concatenate(places)
+
+
+def scene(section, gravity, cells, pulled, clamp, hung=0.0):
     """A box of bricks whose clamp points down by the quantity `beam_tilt`; `pulled` by a force on its tip, which lets
     go; with a mass [kg] on the upper edge of its tip."""
     length = section.length
@@ -27,14 +50,20 @@ def scene(section, gravity, cells, pulled, hung=0.0):
     start = np.tile(section.start, (len(mesh.vertices), 1))
     start[:, 1] += mesh.vertices[:, 1]
     still = mesh.sets["x_min"]
+    held = still if clamp == "pinned" else ()
     beam = sb.add_solid(
-        out, mesh, "beam", density=DENSITY, E=E, poisson=POISSON, damping=DAMPING, held=still, positions=start
+        out, mesh, "beam", density=DENSITY, E=E, poisson=POISSON, damping=DAMPING, held=held, positions=start
     )
-    out.pin(beam.particles[still])
+    nodes, places = beam.particles, mesh.vertices
+    if clamp == "pinned":
+        out.pin(beam.particles[still])
+    else:
+        anchors, away = narrowing(out, mesh, beam, still, section.start)
+        nodes, places = np.concatenate([nodes, anchors]), np.concatenate([places, away])
     out.add_quantity("beam_tilt", TILT, "rad", positive=False, scale=0.1)
-    x, z = mesh.vertices[:, 0], mesh.vertices[:, 2]
+    x, z = places[:, 0], places[:, 2]
     for axis, function, by in ((0, "cos", x), (0, "sin", z), (2, "sin", -x), (2, "cos", z)):
-        out.add_terms([Term("position", 3 * beam.particles + axis, by, (("beam_tilt", function),))])
+        out.add_terms([Term("position", 3 * nodes + axis, by, (("beam_tilt", function),))])
     tip = beam.particles[mesh.sets["x_max"]]
     if pulled:
         out.add_force(tip, np.zeros((2, len(tip), 3)), [0.0, 1e-6])
@@ -60,19 +89,19 @@ def on_tip(beam, offset):
     return sb.Place(tuple(int(p) for p in particles), tuple(weights.tolist()), (0.0,) * 8)
 
 
-def experiment(given, section, cells, hung=0.0):
+def experiment(given, section, cells, clamp):
     """One of the configuration's experiments with its rope made a solid."""
-    made = scene(section, given.recording.gravity, cells, given.start == "equilibrium", hung)
+    made = scene(section, given.recording.gravity, cells, given.start == "equilibrium", clamp)
     beam = made.solids["beam"]
     markers = {name: on_tip(beam, m.offset) for name, m in given.markers.items()}
     return replace(given, scene=made, markers=markers, solver=SOLVER)
 
 
-def fitted(study, cells):
+def fitted(study, cells, clamp="pinned"):
     """E, damping and the clamp's angle of the bare beam, from its rest and its fall."""
     section, own = study.config.scene.rope[0], [e for e in study.experiments if e.name in ("rest", "fall")]
     parameters = {"beam_E": {}, "beam_damping": {}, "beam_tilt": {}, "pull_z": {"private": True}}
-    made = [experiment(e, section, cells) for e in own]
+    made = [experiment(e, section, cells, clamp) for e in own]
     return sb.fit(made, parameters=parameters, profiles=False, refine=False)
 
 
@@ -85,10 +114,10 @@ def frequency(times, z):
     return float(f[inside][power[inside].argmax()])
 
 
-def loaded_frequency(study, cells, values, hung=0.052, seconds=1.5):
+def loaded_frequency(study, cells, values, clamp="pinned", hung=0.052, seconds=1.5):
     """Of the tip's height with the hung mass [kg] after a small pull lets go, with what the bare run gave."""
     given = next(e for e in study.experiments if e.name == "loaded")
-    made = scene(study.config.scene.rope[0], given.recording.gravity, cells, True, hung)
+    made = scene(study.config.scene.rope[0], given.recording.gravity, cells, True, clamp, hung)
     rest = sb.equilibrium(made, values=values)
     beam = made.solids["beam"]
     times = np.arange(0, seconds, 0.01)
@@ -99,16 +128,16 @@ def loaded_frequency(study, cells, values, hung=0.052, seconds=1.5):
 
 if __name__ == "__main__":
     study = load(CONFIG)
-    print("bricks | E, 95 % interval | damping | cost | rest | fall | next second | loaded", flush=True)
-    for cells in MESHES:
-        found = fitted(study, cells)
+    print("clamp | bricks | E, 95 % interval | damping | cost | rest | fall | next second | loaded", flush=True)
+    for clamp, cells in ((clamp, cells) for clamp in CLAMPS for cells in MESHES):
+        found = fitted(study, cells, clamp)
         rest, fall = (next(r for r in found.result.recordings if r.name == part) for part in ("rest", "fall"))
         stiff, damping = found["beam_E"], found["beam_damping"]
         errors = " | ".join(f"{1e3 * error:.3f} mm" for error in (rest.rms, fall.rms, fall.held_out))
         values = {name: found[name].value for name in ("beam_E", "beam_damping", "beam_tilt")}
-        loaded = loaded_frequency(study, cells, values)
+        loaded = loaded_frequency(study, cells, values, clamp)
         print(
-            f"{' x '.join(map(str, cells))} | {stiff.value / 1e3:.0f} kPa, {stiff.lower / 1e3:.0f} to "
+            f"{clamp} | {' x '.join(map(str, cells))} | {stiff.value / 1e3:.0f} kPa, {stiff.lower / 1e3:.0f} to "
             f"{stiff.upper / 1e3:.0f} | {1e3 * damping.value:.2f} ms | {found.result.cost:.2f} | "
             f"{errors} | {loaded:.2f} Hz",
             flush=True,
