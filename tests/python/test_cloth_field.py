@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 import sheetbend as sb
 import tomli_w
+from sheetbend.cli.cloth_figures import stiffness_figures
+from sheetbend.cli.figures import figure_files
 from sheetbend.config import load
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.problem import FitProblem
@@ -106,6 +108,11 @@ def test_intervals_of_triangles_count_the_modes_that_are_not_fitted() -> None:
     finer = field_of(hung(8)).left_out(0.3, 0.1)
     assert (np.array(found.half_widths) > 1.95 * np.sqrt(finer)).all() and finer.min() > 0.0
     assert 0.0 < min(found.left) < max(found.left) <= 1.0
+    (panel,) = stiffness_figures(fit).values()
+    drawn = [np.asarray(axes.collections[0].get_array()) for axes in panel.figure.axes[:3]]
+    mean = np.exp(np.mean(np.log(found.stiffness)))
+    assert (1 + drawn[0] / 1e2) * mean == pytest.approx(np.array(found.stiffness))
+    assert drawn[2] == pytest.approx(1e2 * np.array(found.left))
     assert (found.unit, found.place) == ("N/m", "triangle") and "triangles are known from the data" in fit.report()
 
 
@@ -141,6 +148,7 @@ def test_a_configuration_fits_a_field_on_its_mesh_alone(tmp_path: Path) -> None:
     (tmp_path / "hung.toml").write_text(tomli_w.dumps(config))
     study = load(tmp_path / "hung.toml")
     assert study.options["refine"].finer is None
+    assert "cloth_stiffness.png" in figure_files(study.experiments, study.config)
     problem = FitProblem(study.experiments, as_parameters(["cloth_stiffness_1"], study.experiments))
     plain = FitProblem([e], as_parameters(["cloth_stiffness_1"], [e]))
     assert problem.simulate(np.array([0.3]))[0] == pytest.approx(plain.simulate(np.array([0.3]))[0], abs=1e-9)

@@ -63,17 +63,18 @@ def test_a_prior_that_is_given_is_exact() -> None:
     covariance = np.linalg.inv(J.T @ J + np.diag(weight**2))
     about = field.modes.shapes
     whole = np.column_stack([about, np.ones(N)])
-    half, left = spread(picture, [field], 0, 2)
+    half, left, of_modes = spread(picture, [field], 0, 2)
     assert half == pytest.approx(stats.norm.ppf(0.975) * np.sqrt(np.diag(whole @ covariance @ whole.T)))
     prior = np.sum((about / weight[:2]) ** 2, axis=1)
     assert left == pytest.approx(np.diag(about @ covariance[:2, :2] @ about.T) / prior)
+    assert of_modes == pytest.approx(np.diag(covariance)[:2] * weight[:2] ** 2)
 
 
 def test_a_prior_that_was_found_is_integrated_out() -> None:
     """Against draws of size, length and modes from their priors, weighted by the likelihood of the data."""
     picture, field, J, r = linear(Smooth())
-    half, _ = spread(picture, [field], 0, None)
-    exact, _ = spread(
+    half, _, _ = spread(picture, [field], 0, None)
+    exact, _, _ = spread(
         picture, [Field(field.modes, Smooth(field.size, field.length), field.size, field.length)], 0, None
     )
     n = 400_000
@@ -100,5 +101,5 @@ def test_a_prior_that_was_found_is_integrated_out() -> None:
 
 def test_data_that_tell_nothing_leave_all_of_the_prior() -> None:
     picture, field, _, _ = linear(Smooth(), informative=1e-7)
-    _, left = spread(picture, [field], 0, 2)
-    assert left == pytest.approx(np.ones(N), abs=1e-6)
+    _, left, of_modes = spread(picture, [field], 0, 2)
+    assert left == pytest.approx(np.ones(N), abs=1e-6) and of_modes == pytest.approx([1.0, 1.0], abs=1e-6)

@@ -13,6 +13,8 @@ from ..mesh import Places
 from ..objects.cloth import Cloth
 from ..pictures.field_plot import Field, plot_fields
 from ..pictures.strain import strain_fields
+from ..quantities.wording import short
+from ..result.field import FieldFit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -52,6 +54,28 @@ def cloth_figures(found: Fit, c: Comparison) -> dict[str, Axes]:
         title = f"{e.name}: {cloth.name} {when}"
         figures[cloth.name] = plot_fields(cloth.mesh, fields, title=title, gravity=e.scene.gravity)[0]
     return figures
+
+
+def stiffness_figures(found: Fit) -> dict[str, Axes]:
+    """The first panel of each figure of a stiffness that varies over a cloth, by name of the field: its stiffness, the
+    intervals, and how much of the prior the recordings leave."""
+    cloths = [cloth for c in found.comparisons for cloth in c.experiment.scene.cloths.values()]
+    known = {cloth.field.name: cloth for cloth in cloths if cloth.field is not None}
+    drawn = [(f, known[f.name]) for f in found.result.fields if f.name in known]
+    return {f.name: plot_fields(cloth.mesh, stiffness_panels(f, cloth), title=f.name)[0] for f, cloth in drawn}
+
+
+def stiffness_panels(f: FieldFit, cloth: Cloth) -> list[Field]:
+    """What a fit found of the stiffness of each triangle; those that cannot move have none."""
+    at = {tuple(x): k for k, x in enumerate(cloth.mesh.vertices[cloth.mesh.triangles].mean(axis=1).tolist())}
+    own, E = [at[center] for center in f.centers], np.array(f.stiffness)
+    mean = float(np.exp(np.log(E).mean()))
+    from_mean = f"along the warp, from {short(mean, 3)} {f.unit} [%]"
+    values = np.full((3, len(cloth.mesh.triangles)), np.nan)
+    values[:, own] = 1e2 * (E / mean - 1.0), 1e2 * np.expm1(f.half_widths), 1e2 * np.array(f.left)
+    labels = (f"stiffness {from_mean}", "95 % interval, +/- [%]", "share of the prior that is left [%]")
+    space = cloth.mesh.vertices if cloth.mesh.material.ndim == 3 else None  # no flat chart covers it
+    return [Field(label, each, space) for label, each in zip(labels, values, strict=True)]
 
 
 def _farthest(c: Comparison) -> int:

@@ -18,7 +18,7 @@ from ..optional import require
 from ..pictures import plotting
 from ..pictures.estimate_plot import plot_estimates
 from ..pictures.force_plot import plot_forces
-from .cloth_figures import cloth_figures
+from .cloth_figures import cloth_figures, stiffness_figures
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -59,6 +59,7 @@ def write_figures(found: Fit, config: Config, form: str, folder: Path) -> list[s
     for c in found.comparisons:
         figures |= {f"{c.experiment.name}_{one.sensor}": plot_forces(one) for one in c.forces}
         figures |= {f"{c.experiment.name}_{name}": figure for name, figure in cloth_figures(found, c).items()}
+    figures |= stiffness_figures(found)
     published = _published(found, config)
     figures["estimates"] = plot_estimates(found.result.estimates, published=published, title=config.experiment.name)
     for name, figure in figures.items():
@@ -76,6 +77,7 @@ def figure_files(experiments: Sequence[Experiment], config: Config) -> list[str]
         names += [] if not _follows_markers(e) else [f"{e.name}_markers", f"{e.name}_residuals"]
         names += [f"{e.name}_{sensor.name}" for sensor in e.forces]
         names += [f"{e.name}_{cloth}" for cloth in e.scene.cloths]
+        names += [cloth.field.name for cloth in e.scene.cloths.values() if cloth.field is not None]
     return [f"{name}.{form}" for name in names]
 
 

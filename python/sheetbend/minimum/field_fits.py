@@ -19,6 +19,7 @@ from .smooth import Field, Picture
 
 LEVEL = 0.95
 HALVINGS = 40  # of the range of half-widths
+FINEST = 0.1  # of the modes
 
 
 def field_fits(problem: FitProblem, u: Array, fields: Sequence[Field]) -> tuple[FieldFit, ...]:
@@ -33,7 +34,8 @@ def field_fits(problem: FitProblem, u: Array, fields: Sequence[Field]) -> tuple[
         mean = values.get(modes.stiffness, _given(problem, modes.stiffness))
         E = mean * np.exp(modes.shapes @ u[picture.columns[i]])
         level = columns.index(modes.stiffness) if modes.stiffness in columns else None
-        half, left = spread(picture, fields, i, level)
+        half, left, of_modes = spread(picture, fields, i, level)
+        finest = float(np.mean(of_modes[-math.ceil(FINEST * len(of_modes)) :]))
         found.append(
             FieldFit(
                 name=modes.name,
@@ -47,6 +49,7 @@ def field_fits(problem: FitProblem, u: Array, fields: Sequence[Field]) -> tuple[
                 stiffness=tuple(E.tolist()),
                 half_widths=tuple(half.tolist()),
                 left=tuple(left.tolist()),
+                finest=finest if modes.finer.shape[1] else None,
                 unit=modes.unit,
                 place=modes.place,
             )
@@ -54,8 +57,9 @@ def field_fits(problem: FitProblem, u: Array, fields: Sequence[Field]) -> tuple[
     return tuple(found)
 
 
-def spread(picture: Picture, fields: Sequence[Field], i: int, level: int | None) -> tuple[Array, Array]:
-    """Half-widths of ln E (places,) of one field, and the shares of the prior's variance that the data leave.
+def spread(picture: Picture, fields: Sequence[Field], i: int, level: int | None) -> tuple[Array, Array, Array]:
+    """Half-widths of ln E (places,) of one field, the shares of the prior's variance that the data leave of each, and
+    those of each mode (modes,).
 
     The priors of other fields are taken as exact.
 
@@ -65,18 +69,19 @@ def spread(picture: Picture, fields: Sequence[Field], i: int, level: int | None)
     modes, own = fields[i].modes, picture.columns[i]
     at_minimum, _ = picture.solved(fields)
     each, weights = picture.possible(fields, i)
-    shifts, variances, left = [], [], np.zeros(len(modes.centers))
+    shifts, variances, left, of_modes = [], [], np.zeros(len(modes.centers)), np.zeros(len(own))
     for one, weight in zip(each, weights, strict=True):
         step, root = picture.solved([*fields[:i], one, *fields[i + 1 :]])
         shift, about = modes.shapes @ (step - at_minimum)[own], modes.shapes @ root[own]
-        unknown = modes.left_out(one.size, one.length)
-        prior = np.sum((modes.shapes * modes.deviations(one.size, one.length)) ** 2, axis=1) + unknown
+        unknown, deviations = modes.left_out(one.size, one.length), modes.deviations(one.size, one.length)
+        prior = np.sum((modes.shapes * deviations) ** 2, axis=1) + unknown
+        of_modes += weight * np.sum((root[own] / deviations[:, None]) ** 2, axis=1)
         left += weight * (np.sum(about**2, axis=1) + unknown) / np.maximum(prior, 1e-300)
         if level is not None:
             shift, about = shift + (step - at_minimum)[level], about + root[level]
         shifts.append(shift)
         variances.append(np.sum(about**2, axis=1) + unknown)
-    return half_widths(weights, np.array(shifts), np.sqrt(variances)), left
+    return half_widths(weights, np.array(shifts), np.sqrt(variances)), left, of_modes
 
 
 def half_widths(weights: Array, shifts: Array, deviations: Array) -> Array:

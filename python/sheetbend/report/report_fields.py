@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..quantities.wording import short
-from ..result.field import KNOWN, PRIOR_ALONE, FieldFit
+from ..result.field import KNOWN, PRIOR_ALONE, UNSEEN, FieldFit
 from ..result.result import FitData
 from .tables import Section
 
@@ -23,6 +23,11 @@ def stiffness_fields(result: FitData) -> list[Section]:
         ("size", "rms of ln E about its mean that the prior expects; length: over which neighbors are alike"),
         ("95 %", "interval of what was found from the recordings; open: they do not determine it"),
     ]
+    few = {f.name: f.finest for f in result.fields if f.finest is not None and f.finest < UNSEEN}
+    if few:
+        told = ", ".join(f"{name} ({100 * left:.0f} %)" for name, left in few.items())
+        why = "of the prior's variance is left in the finest modes. The data therefore show finer modes too"
+        notes.append(("too few modes", f"{told}: {why}, which change the estimates. Give more stiffness_modes"))
     return [Section("Stiffness fields", headers, tuple(rows), tuple(notes)), *map(_places, result.fields)]
 
 

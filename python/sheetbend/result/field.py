@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 KNOWN, PRIOR_ALONE = 0.1, 0.9  # share of the prior's variance that the data leave
+UNSEEN = 0.75  # likewise, of the finest modes: where the data leave less, they see finer ones too
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,6 +24,7 @@ class FieldFit:
             were found, and what the prior expects of modes finer than those that are fitted.
         left: of each place, the share of the prior's variance of ln E about its mean that the data leave, on average
             over the sizes and lengths that are possible.
+        finest: the same share of the finest tenth of the modes that are fitted; None where all modes are fitted.
         unit: of the stiffness.
         place: what one place is called.
     """
@@ -38,5 +40,6 @@ class FieldFit:
     stiffness: tuple[float, ...]
     half_widths: tuple[float, ...]
     left: tuple[float, ...]
+    finest: float | None = None
     unit: str = "Pa"
     place: str = "cluster"
