@@ -3,7 +3,8 @@ truth.
 
     python experiments/held_cloth/seeds.py 50 out/held_cloth/study.json
 
-The truth has 18 x 18 cells here. A seed takes some 6 s of processor time. What is in the JSON file already is kept, so that the study can be stopped.
+The truth has 18 x 18 cells here. A seed takes some 6 s of processor time. What is in the JSON file already is kept, so
+that the study can be stopped.
 """
 
 from __future__ import annotations
