@@ -100,20 +100,20 @@ class Truth:
     mesh: sb.TriangleMesh
 
 
-def truth() -> Truth:
-    """Simulate what the camera will see."""
+def truth(finer: int = FINER) -> Truth:
+    """Simulate what the camera will see, on a mesh that is so much finer than that of the fit."""
     tool = sb.Tool(*poses(), ROBOT)
-    scene = cloth(tool, FINER, _bent(tool))
+    scene = cloth(tool, finer, _bent(tool, finer))
     times = np.arange(0.0, REST + SECONDS, 1 / 120)
     start = sb.equilibrium(scene).positions
     motion = sb.simulate(scene, times, sb.Solver(h=H, method="newton"), start=start)
     return Truth(times, motion.positions, scene.cloths["cloth"].mesh)
 
 
-def _bent(tool: sb.Tool) -> Array:
+def _bent(tool: sb.Tool, finer: int) -> Array:
     """(knots, k, 3) m: the true motion of the bar, in the camera's frame. Its rod gives across itself like a damped
     spring, under the bar's weight and inertia."""
-    n = CELLS * FINER + 1
+    n = CELLS * finer + 1
     line = np.stack([np.linspace(-SIZE / 2, SIZE / 2, n), np.zeros(n), np.zeros(n)], axis=1)
     rigid = ROBOT.corrected(tool.path(line), CORRECTION)
     ends = ROBOT.corrected(tool.path([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]), CORRECTION)
