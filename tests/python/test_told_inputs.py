@@ -244,6 +244,21 @@ def test_a_cloth_with_one_stiffness_for_both_directions_is_named(weft: float) ->
     assert (found["cloth_warp"].verdict == "doubtful") == (weft < 60.0)
 
 
+def test_cuts_of_one_fabric_share_its_second_stiffnesses() -> None:
+    """A fit of two cloths of one fabric ended with an error after its work."""
+    scene, mesh = sb.Scene("two"), sb.mesh.grid(0.3, 0.3, 3, 3, pattern="one_way")
+    own = {"density": 0.12, "warp": 60.0, "shear": 8.0, "bending": 1e-5, "fabric": "twill"}
+    for k in range(2):
+        x = mesh.vertices[:, [0, 2, 1]] + [float(k), 0.0, 0.0]
+        scene.pin(sb.add_cloth(scene, mesh, f"cut{k}", positions=x, **own).particles[mesh.sets["top"]])
+    seen = [int(c.particles[mesh.sets["bottom"][0]]) for c in scene.cloths.values()]
+    recording = sb.Recording(positions=np.tile(scene.positions[seen], (5, 1, 1)), times=TIMES[:5], name="seen")
+    places = [sb.on_particle(p) for p in seen]
+    e = sb.Experiment(scene=scene, recording=recording, markers=places, solver=sb.Solver(h=1 / 200))
+    told = told_of(FitProblem([e], as_parameters(["twill_warp"], [e])), "isotropy")
+    assert {"twill_weft over warp", "twill_bending_weft over bending", "twill_bending_twist over bending"} == set(told)
+
+
 def test_a_rod_with_one_stiffness_for_both_directions_tells_the_second() -> None:
     """What the ratio's logarithm changes, as a rod with two stiffnesses has it."""
 

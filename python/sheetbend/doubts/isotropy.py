@@ -8,7 +8,7 @@ direction alone, a fit of one number for both takes the soft one for both, and l
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,11 +31,11 @@ class Alike:
     """
 
     label: str
-    added: Input
+    added: list[Input]
     says: Callable[[float], str]
 
 
-_OF_CLOTH = (
+_OF_CLOTH = (  # of bends that know directions; hinges between triangles know none
     ("_membrane", 5, "weft", "warp"),
     ("_bend", 9, "bending_weft", "bending"),
     ("_bend", 10, "bending_twist", "bending"),
@@ -43,33 +43,40 @@ _OF_CLOTH = (
 
 
 def alike(scene: Scene, inputs: Array) -> Iterator[Alike]:
-    """The ratios of a scene that no quantity changes.
+    """The ratios of a scene that no quantity changes; cuts of one fabric share theirs.
 
     Args:
         inputs: of the scene.
     """
+    found: dict[str, Alike] = {}
+    for one in _each(scene, inputs):
+        found.setdefault(one.label, replace(one, added=[])).added.extend(one.added)
+    yield from found.values()
+
+
+def _each(scene: Scene, inputs: Array) -> Iterator[Alike]:
     for cloth in scene.cloths.values():
         for group, place, second, first in _OF_CLOTH:
-            yield from _ratio(scene, inputs, cloth.name, cloth.name + group, place, second, first, cloth.fabric)
+            yield from _ratio(scene, inputs, cloth.fabric, cloth.name + group, place, second, first)
     for rope in scene.ropes.values():
         if isinstance(rope, Rod):
-            yield from _ratio(scene, inputs, rope.name, f"{rope.name}_bend", 0, "EI2", "EI", rope.name)
+            yield from _ratio(scene, inputs, rope.name, f"{rope.name}_bend", 0, "EI2", "EI")
 
 
 def _ratio(
-    scene: Scene, inputs: Array, name: str, group: str, place: int, second: str, first: str, prefix: str
+    scene: Scene, inputs: Array, prefix: str, group: str, place: int, second: str, first: str
 ) -> Iterator[Alike]:
     known = {g.name: g for g in scene.groups}
     if f"{prefix}_{second}" in scene.quantities or f"{prefix}_{first}" not in scene.quantities or group not in known:
         return
     count, width = known[group].rest.shape
-    if place >= width:
+    if place >= width or (place > 8 and "sheet_curvature" not in known[group].kind):
         return
     at = first_value(scene, group) + width * np.arange(count) + place
     values = inputs[scene.compiled.layout["rest"][0] + at]
 
     def says(size: float) -> str:
         how = "stiffer" if size > 0 else "softer"
-        return f"{second} of {name} were {short(100 * abs(np.expm1(size)), 2)} % {how} than its {first} ({second})"
+        return f"{second} of {prefix} were {short(100 * abs(np.expm1(size)), 2)} % {how} than its {first} ({second})"
 
-    yield Alike(f"{prefix}_{second} over {first}", ("rest", at, 0.5 * values), says)
+    yield Alike(f"{prefix}_{second} over {first}", [("rest", at, 0.5 * values)], says)

@@ -131,18 +131,18 @@ def _collect(
         made.append((weight, Told(i, name, name, q.unit, step[1:], _NONE, value=value, relative=step[0])))
         asked.append((name, k, log))
     blown, moves = drafts(problem, u, i, e.scene.compiled.inputs(own))
-    added: dict[str, Any] = {}
+    added: dict[str, Any] = {}  # by any names, for two errors may share a label
     for given in told_inputs(e, own, blown.experiments[i]):
         one = Told(i, given.name, given.label, given.unit, given.step, _NONE, missing=given.says)
         made.append((1.0, replace(one, signed=given.says is not None, relative=not (given.unit or given.says))))
-        added[given.label] = given.added
+        added[f"{given.label}, {len(added)}"] = given.added
     for axis, more in enumerate(moves):
         label = f"{DRAFT} {AXES[axis]}"
         made.append((1.0, Told(i, "draft", label, *GROUPS["draft"], _NONE)))
-        added[label] = more
+        added[f"{label}, {len(added)}"] = more
     lengths = {name: (k, own[place] if log else 1.0) for k, (name, place, log) in enumerate(asked)}
     stuck_out = [lead for lead in leads(e.scene, e.scene.compiled.inputs(own)) if f"{lead.rope}_length" in lengths]
-    added |= {lead.label: lead.added for lead in stuck_out}
+    added |= {f"{lead.label}, {len(added) + k}": lead.added for k, lead in enumerate(stuck_out)}
     by_gravity: dict[int, Array] = {}
     sticking: list[tuple[Lead, Array]] = []
     if made:
