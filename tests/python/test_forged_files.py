@@ -398,6 +398,13 @@ def test_a_fit_whose_refits_lack_a_parameter_is_reported(tmp_path: Path, fit: di
     assert "finer" in sb.FitResult.load(path).report()
 
 
+def test_a_fit_whose_raced_starts_lack_a_parameter_is_reported(tmp_path: Path, fit: dict[str, Any]) -> None:
+    path = tmp_path / "fit.json"
+    start = {"cost": 1.0, "iterations": 3, "converged": True, "values": {}, "first": {}, "raced": 1.0, "group": 0}
+    path.write_text(json.dumps(fit | {"starts": [start, start]}))
+    assert "Groups of starts" in sb.FitResult.load(path).report()
+
+
 def test_a_fit_comes_back(tmp_path: Path, fit: dict[str, Any]) -> None:
     path = tmp_path / "fit.json"
     path.write_text(json.dumps(fit))

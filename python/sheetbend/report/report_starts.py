@@ -36,7 +36,7 @@ def groups_of_starts(result: FitData) -> Section:
     for group in list(groups.values())[:_GROUPS]:
         raced = [start.raced for start in group if start.raced is not None]
         cost = "diverged" if group[0].cost is None else short(group[0].cost, 6)
-        values = [short(group[0].values[name]) for name in names]
+        values = [short(group[0].values[name]) if name in group[0].values else "" for name in names]
         ends = (short(min(raced), 6), short(max(raced), 6)) if raced else ("", "")
         rows.append((str(len(group)), cost, *ends, *values))
     headers = ("starts", "cost of its fit", "raced to", "at most", *names)
