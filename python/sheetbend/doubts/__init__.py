@@ -14,7 +14,8 @@
 5.  Were the recordings read right? `misread`: axes, units, order of markers; `lost_frames`; `implausible`: units of
     what was given.
 6.  What does it rest on? `given`: what an error of each given value moves. `told` has these values and what an error of
-    each changes, with `told_words`, `tangents`, and for some of them `sensor_errors`, `marker_mass` and `draft`.
+    each changes, with `told_words`, `tangents` and `told_inputs` (what changes inputs of a scene), and for some of them
+    `held_directions`, `lead`, `isotropy`, `sensor_errors`, `marker_mass` and `draft`.
 7.  Is a given value wrong, or does the model lack a part? `wrong_given` asks it of all of them: `causes` and
     `two_directions` say which one or two explain what the fit leaves, among the directions of `lacking`:
     `missing_parts`, `losses_at_zero` and `cloth_size`. `spin` asks it of the ends of rods.
