@@ -222,10 +222,12 @@ inline Case case_of<Strain>() {
           .parameter_relabeling = {2, 3, 0, 1, 4, 5, 6}};
 }
 
-// Sliding: the shear from the set is about three times the yield strain.
+// Sliding: the shear from the set is about three times the yield strain. Damping as for YieldingBrickStrain, below: at Strain's the derivative with respect
+// to compliance loses three digits to cancellation in one of the random states.
 template <>
 inline Case case_of<YieldingStrain>() {
   Case row = case_of<Strain>();
+  row.damping = 0.01;
   row.x.insert(row.x.end(), {0.0, 0.0, 0.05});
   row.p.insert(row.p.end(), {0.4, 0.03});
   row.relabeling.push_back(3);
