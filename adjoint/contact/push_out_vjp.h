@@ -2,7 +2,7 @@
 //
 //   s = (I - w dF/dx)^-T (F_bar + w x_bar),   y_bar = x_bar + (dF/dx)^T s,   and s goes through F to what the law reads.
 //
-// w and s are in the world's frame, the law in the collider's.
+// x, y, s and their cotangents are in the world's frame, the law in the collider's.
 #pragma once
 
 #include "adjoint/contact/touch_vjp.h"
@@ -10,7 +10,7 @@
 
 namespace sheetbend {
 
-// (dF/dx)^T s, given F_bar + w x_bar. Adds to the cotangents of the numbers and of the pose.
+// Returns (dF/dx)^T s, given `bar` = F_bar + w x_bar. Adds to the cotangents of the numbers and of the pose.
 template <class Shape, class S>
 Vec3<S> push_out_vjp(const Shape& shape, const Pose<S>& pose, const Vec3<S>& x, const S& w,
                      const ContactNumbers<S>& numbers, const Vec3<S>& bar, ContactNumbers<S>& numbers_bar,
@@ -20,7 +20,7 @@ Vec3<S> push_out_vjp(const Shape& shape, const Pose<S>& pose, const Vec3<S>& x, 
   const auto inverse = balance_inverse(shape, z, w, numbers);
   const auto solved = [&](const Vec3<S>& v) { return pose.turned(inverse.transposed_times(pose.turned_back(v))); };
   Vec3<S> s = solved(bar);
-  if (numbers.firm > 1.0) {  // the inverse has fewer digits then, and a second pass the others
+  if (numbers.firm > 1.0) {  // the inverse loses digits then: one step of iterative refinement
     ContactNumbers<S> unused{};
     Pose<S> unused_pose{};
     s = s + solved(bar - s + w * push_vjp(shape, pose, x, numbers, at, s, unused, unused_pose));

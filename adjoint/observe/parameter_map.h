@@ -79,13 +79,13 @@ struct ParameterTerms {
   std::vector<Factor1d> function;    // per factor
   std::vector<double> weight;        // per factor; counts in exponentials alone
 
-  int factor_count(std::size_t term) const { return first_factor[term + 1] - first_factor[term]; }
+  int factors_of(std::size_t term) const { return first_factor[term + 1] - first_factor[term]; }
   bool same_factors(std::size_t s, std::size_t t) const {
     const auto alike = [&](const auto& of) {
       const auto first = of.begin() + first_factor[s];
-      return std::equal(first, first + factor_count(s), of.begin() + first_factor[t]);
+      return std::equal(first, first + factors_of(s), of.begin() + first_factor[t]);
     };
-    return factor_count(s) == factor_count(t) && alike(parameter) && alike(function) && alike(weight);
+    return factors_of(s) == factors_of(t) && alike(parameter) && alike(function) && alike(weight);
   }
 };
 

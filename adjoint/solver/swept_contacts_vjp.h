@@ -91,7 +91,7 @@ void project_contacts_vjp(const ContactSource<T>& source, const Plan& plan, int 
   }
 }
 
-// What has gathered goes on, at the end of a substep's reverse.
+// What has gathered goes on at the end of a substep's reverse; `bar` is zero again after it.
 template <class T>
 void spread_contacts(const ContactSource<T>& source, const Plan& plan, const SweptContacts<Single<T>>& contacts,
                      SweptContactCotangents<Single<T>>& bar, const StateCotangents<T>& from_bar,

@@ -77,7 +77,7 @@ void ReverseOf<ProjectBlocks>::run(const Step<T>& step, const Work<T>& work, Pro
   }
 }
 
-// The scalars of adjoint/instances_*.cpp.
+// The scalars of adjoint/rollout/instances_*.cpp.
 extern template void ReverseOf<ProjectBlocks>::run(const Step<double>&, const Work<double>&,
                                                    ProjectBlocks::Record<double>&, Scratch<double>&,
                                                    const StepCotangents<double>&);

@@ -132,7 +132,7 @@ void ReverseOf<SweepColors>::run(const Step<T>& step, const Work<T>& work, Sweep
   damping_references_vjp(step.scene, step.in, step.bdf, step.from, scratch.C_r.data(), bar.from, bar.in);
 }
 
-// The scalars of adjoint/instances_*.cpp.
+// The scalars of adjoint/rollout/instances_*.cpp.
 extern template void ReverseOf<SweepColors>::run(const Step<double>&, const Work<double>&, SweepColors::Record<double>&,
                                                  Scratch<double>&, const StepCotangents<double>&);
 extern template void ReverseOf<SweepColors>::run(const Step<Pack>&, const Work<Pack>&, SweepColors::Record<Pack>&,

@@ -1,7 +1,7 @@
 // The material frames on the two sides of a joint, and what turns between them (Bergou et al. 2010, sec. 4.2). A frame has an axis t and a
 // director q, any vector that is not parallel to t: m1 = the part of q across t, of length one, and m2 = t x m1. The axis is
 // that of an edge; or, where sections may shear (shear.h), a section's normal n, a coordinate like q.
-// Directors and normals are coordinates of their own (quasi-static, see retract.h), so no frame has to be carried from one evaluation to the next.
+// Directors and normals are coordinates of their own (quasi-static, see core/step/retract_directors.h), so no frame has to be carried from one evaluation to the next.
 //
 // With P the shortest rotation of t1 onto t2: the twist is the angle from P m1 of the first frame to m1 of the second. Its derivative is
 // d(twist) = d(angle 2) - d(angle 1) + kb . (dt1 + dt2)/2, where a frame's angle is that of m1 about t.

@@ -5,15 +5,16 @@
 namespace sheetbend_contacts {
 
 inline constexpr int lanes = 8;
-inline constexpr int point_numbers =
-    8;  // a particle's own: from (3), carried (3), kappa, w, as in core/contact/touch.h
-inline constexpr int push_numbers =
-    7;  // of a pass: where the particle is (3), the force on it (3), the push along the normal
+// A particle's own: from (3), carried (3) and kappa as in core/contact/touch.h, and w, its inverse mass.
+inline constexpr int point_numbers = 8;
+// Of a pass: where the particle is (3), the force on it (3), and whether it is pushed (1 or 0).
+inline constexpr int push_numbers = 7;
 inline constexpr int pose_numbers = 12;  // a position and the axes
 inline constexpr int most_sizes = 4;
 inline constexpr int shared_numbers = 4 + most_sizes;  // of all particles: friction, radius, loss, kappa, sizes
 
-// Coordinate d of a node stands at (stride node + d) apart, of one scene in lanes at that of its lane.
+// Coordinate d of a node is data[(stride * node + d) * apart]. Of scenes in the lanes of packs, `apart` is the number of lanes and `data` begins at the
+// lane of one scene; of a scene alone, `apart` is 1.
 template <class Number>
 struct Points {
   Number* data;
@@ -30,14 +31,14 @@ struct Contacts {
   double friction, radius, loss, size[most_sizes];
   double now, before, eta2;  // as in Bdf
   bool soft;
-  double kappa;  // of a soft contact, otherwise times w
+  double kappa;  // of a soft contact; of a rigid one kappa w
   double next[pose_numbers], pose_now[pose_numbers], pose_before[pose_numbers];
   Given x, x_before, w;  // at n and n-1; inverse masses
   double* numbers;       // (packs, point_numbers, 8)
   char* ready;           // (packs, 8): whether they are there; by registers, as `pushes` below
 };
 
-// A pass over them. What came before it is null at the first one, and may be what is written.
+// A pass over them. `push_before` and `pushes_before` are of the pass before, null at the first one; they may be the arrays that are written.
 struct Pass {
   Written q;
   double* push;  // (packs, push_numbers, 8)
@@ -54,7 +55,7 @@ struct Carry {
   char* modes;  // (packs, 8): 0 apart, 1 sticks, 2 slides
 };
 
-// Cotangents, all added to.
+// Cotangents, all added to but `force`: the reverse of a pass replaces it by that of the pass before.
 struct Cotangents {
   double* numbers;  // (packs, point_numbers, 8)
   double* force;    // (packs, 3, 8), of the pass at hand
@@ -63,14 +64,14 @@ struct Cotangents {
 };
 
 struct Kernels {
-  // Returns a particle that finds no place on the surface, or -1.
+  // Returns which of the contacts finds no place on the surface, or -1.
   int (*project)(const Contacts&, const Pass&);
   void (*carry)(const Contacts&, const Carry&);
   // Whether one is inside at x that was not at n.
   bool (*begins)(const Contacts&, const Given& x);
-  // Pass::q is that of cotangents.
+  // Pass::q are the cotangents of the coordinates.
   void (*project_vjp)(const Contacts&, const Pass&, const Cotangents&);
-  // Of Carry the forces' cotangents are read. Those of the particles go to x_bar.
+  // Reads the cotangents of the forces from Carry::carried, and adds those of the particles to x_bar.
   void (*carry_vjp)(const Contacts&, const Carry&, const Written& x_bar, const Cotangents&);
 };
 

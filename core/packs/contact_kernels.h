@@ -62,7 +62,7 @@ class ContactPlace {
     for (int lane = 0; lane < live_; ++lane)
       p.data[static_cast<long>(p.apart) * p.stride * nodes[first_ + lane]] = a[lane];
   }
-  // The same lanes of one pack for all.
+  // These lanes of sums (numbers, 8), to which all places add.
   Strip<double> lanes_of(double* numbers) const { return {numbers, n_ % parts_per_pack, 0}; }
 
  private:
@@ -138,11 +138,11 @@ class ContactKernels {
       Vec3<Register> from = Register(c.now) * pose_of(c.pose_now).in_frame(place.load(c.x, c.nodes));
       if (c.before != 0.0)
         from = from + Register(c.before) * pose_of(c.pose_before).in_frame(place.load(c.x_before, c.nodes));
-      const Register mass = place.load_number(c.w, c.nodes);
+      const Register inverse_mass = place.load_number(c.w, c.nodes);
       set_vector(own, 0, from);
       set_vector(own, 3, Register(c.eta2) * place.load(c.x, c.carries));
-      own.set(6, c.soft ? Register(c.kappa) : Register(c.kappa) / mass);
-      own.set(7, mass);
+      own.set(6, c.soft ? Register(c.kappa) : Register(c.kappa) / inverse_mass);
+      own.set(7, inverse_mass);
     }
     Numbers a{};
     a.from = vector_of(own, 0), a.carried = vector_of(own, 3), a.kappa = own[6], w = own[7];

@@ -1,5 +1,5 @@
 // A rollout: substeps from the initial state. The forward program is the same whether its states are kept (the tape) or not.
-// Compiled once per scalar (adjoint/instances_*.cpp): whoever steps a rollout does not compile the solver again.
+// Compiled once per scalar (adjoint/rollout/instances_*.cpp): whoever steps a rollout does not compile the solver again.
 #pragma once
 
 #include <optional>

@@ -1,5 +1,5 @@
-// The contacts of one group between sweeps, eight particles at a time: where each one's numbers are, and what the kernels of core/contact work on. A scene
-// in a lane of a pack goes by itself, as it would alone.
+// The contacts of one group between sweeps, eight particles at a time: the arrays that the kernels (core/contact/kernels.h) work on. Where T is a pack, its
+// scenes go one after the other, each as it would alone.
 #pragma once
 
 #include <vector>
@@ -43,8 +43,11 @@ class PackedContacts {
   void begin(const SweptGroup& group, const ColliderPoses<double>& poses, int collider);
 
   sheetbend_contacts::Contacts contacts_{};
-  Numbers<double> numbers_, pushes_;           // the latter of all passes or the last one
-  std::vector<char> ready_, pushing_, modes_;  // likewise the second of these
+  Numbers<double> numbers_;
+  std::vector<char> ready_, modes_;
+  // Of all passes or the last one.
+  Numbers<double> pushes_;
+  std::vector<char> pushing_;
 };
 
 template <class T>

@@ -87,7 +87,7 @@ struct SweptContact {
 // The particles of one contact that go by sweeps, those from `first` on in Plan::contacts.
 struct SweptGroup {
   int contact, first, count;
-  // Of groups that go through the kernels of core/contact: (packs, 8), a short last pack repeats its last particle. Otherwise empty.
+  // Of groups that go through kernels (core/contact/kernels.h): (packs, 8), where a short last pack repeats its last particle. Otherwise empty.
   std::vector<int> nodes = {}, carries = {};
 
   bool packed() const { return !nodes.empty(); }
@@ -99,7 +99,7 @@ struct Plan {
   PackPlan packs;  // the same colors, eight constraints at a time
   std::vector<DirectBlock> blocks;
   std::vector<SweptContact> contacts = {};      // between sweeps, in the order of the scene
-  std::vector<SweptGroup> contact_groups = {};  // the same
+  std::vector<SweptGroup> contact_groups = {};  // the same, one for each contact of the scene
 };
 
 // Iterations over blocks and colors that a record for the reverse holds; an implicit step is known by where it ends.

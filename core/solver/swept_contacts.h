@@ -1,8 +1,8 @@
 // Contacts of particles that go by sweeps. After each pass over the constraints every contact is projected: what the constraints and other contacts have
 // made of its particle, its own force of the pass before taken off, is y; the particle goes to x = y + w F(x) (core/contact/balanced.h). F is
 // the force of the whole substep and no increment, so that Coulomb's limit is that of the whole push, and what a contact pushed too far in an early pass
-// it takes back later. One thread works, in the order of contacts, so bits do not depend on their number. Numbers go eight contacts at a time
-// (packed_contacts.h), other scalars one by one; the bits of numbers are the same in both.
+// it takes back later. One thread works, in the order of contacts, so bits do not depend on their number. Plain numbers go eight contacts at a time
+// (packed_contacts.h), other scalars one by one; plain numbers have the same bits in both.
 #pragma once
 
 #include <algorithm>

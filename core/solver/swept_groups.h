@@ -8,7 +8,7 @@ namespace sheetbend {
 // The contacts of movable particles, in the order of the scene.
 std::vector<SweptContact> swept_contacts(const Scene& scene);
 
-// The same by scene contacts. Grids are read particle by particle, and so is what restitution lifts; all others go in packs.
+// The same in groups, one for each contact of the scene. Particles on grids and particles that rebound go one by one; all others go in packs.
 std::vector<SweptGroup> swept_groups(const Scene& scene, const std::vector<SweptContact>& contacts);
 
 }  // namespace sheetbend

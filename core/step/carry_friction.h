@@ -20,9 +20,11 @@ void for_each_contact(const Step<T>& step, const InverseMasses<T>& masses, F&& f
     if (!has(step.scenes, lane)) continue;
     const ContactSource<T> source = contact_source(step, masses, lane);
     const auto poses = source.poses();
-    for (int c = 0; c < static_cast<int>(step.scene.contacts.size()); ++c)
-      for (int i = 0; !in_packs(c) && i < step.scene.contacts[c].points(); ++i)
+    for (int c = 0; c < static_cast<int>(step.scene.contacts.size()); ++c) {
+      if (in_packs(c)) continue;
+      for (int i = 0; i < step.scene.contacts[c].points(); ++i)
         if (moves(step.scene, step.scene.contacts[c], i)) f(source, poses, c, i);
+    }
   }
 }
 

@@ -31,6 +31,7 @@ Scenes where_contact_begins(const Step<T>& step, const InverseMasses<T>& masses,
              value_of(source.gap(poses.next[c.collider], contact, source.point(c, item, x_next))) < above &&
              !(value_of(source.gap(poses.now[c.collider], contact, source.point(c, item, step.from.x))) < 0.0);
     };
+    // Kernels look at places alone; whether a soft contact is followed depends on each particle's mass.
     const auto any_begins = [&](int contact) {
       const Contact& c = scene.contacts[contact];
       if constexpr (std::is_same_v<Single<T>, double>)

@@ -76,7 +76,7 @@ void ProjectBlocks::forward(const Step<T>& step, Work<T>& work, Record<T>& recor
   if (work.multipliers) multipliers(step.scene, plan, step.in, record, work.multipliers);
 }
 
-// The scalars of adjoint/instances_*.cpp.
+// The scalars of adjoint/rollout/instances_*.cpp.
 extern template void ProjectBlocks::forward(const Step<double>&, Work<double>&, Record<double>&);
 extern template void ProjectBlocks::forward(const Step<Pack>&, Work<Pack>&, Record<Pack>&);
 extern template void ProjectBlocks::forward(const Step<Complex>&, Work<Complex>&, Record<Complex>&);

@@ -168,7 +168,7 @@ void SweepColors::forward(const Step<T>& step, Work<T>& work, Record<T>& record)
     if (swept) end_sweeps(scene, record.packs, q);
 }
 
-// The scalars of adjoint/instances_*.cpp.
+// The scalars of adjoint/rollout/instances_*.cpp.
 extern template void SweepColors::forward(const Step<double>&, Work<double>&, Record<double>&);
 extern template void SweepColors::forward(const Step<Pack>&, Work<Pack>&, Record<Pack>&);
 extern template void SweepColors::forward(const Step<Complex>&, Work<Complex>&, Record<Complex>&);
