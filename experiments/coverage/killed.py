@@ -84,6 +84,8 @@ def main() -> None:
     with (folder / "killed.log").open("w") as log:
         process = subprocess.Popen(command(*fit, folder / "out"), stdout=log, stderr=log)
         while len(results(folder / "out")) < KILLED_AFTER:
+            if process.poll() is not None:
+                raise SystemExit(f"the fits ended by themselves, see {log.name}")
             time.sleep(0.02)
         process.send_signal(signal.SIGKILL)
         process.wait()

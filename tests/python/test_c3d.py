@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sheetbend.errors import RecordingError
+from sheetbend.recording.io import told_unit
 from sheetbend.recording.recording import Recording
 
 INTEL, DEC, MIPS = 84, 85, 86
@@ -120,7 +121,7 @@ def test_its_unit_holds_and_the_json_tells_the_rest(tmp_path: Path) -> None:
         (lambda data: data[:600], "is damaged or cut off"),
         (lambda data: data[:-9], "is damaged or cut off"),
         (lambda data: data[:515] + b"\x63" + data[516:], "is damaged or cut off"),
-        (lambda data: data.replace(b"\x02mm", b"\x02in"), "names no known length unit"),
+        (lambda data: data.replace(b"\x02mm", b"\x02em"), "names no known length unit"),
         (lambda data: data[:20] + b"\x00" * 4 + data[24:].replace(b"RATE", b"RAVE"), "no frames per second"),
     ],
 )
@@ -129,6 +130,15 @@ def test_what_is_damaged_is_refused(tmp_path: Path, damage, words: str) -> None:
     path.write_bytes(damage(path.read_bytes()))
     with pytest.raises(RecordingError, match=words):
         Recording.load(path)
+
+
+def test_its_unit_is_told(tmp_path: Path) -> None:
+    assert told_unit(written(tmp_path)) == "mm"
+    bare = tmp_path / "bare.csv"
+    bare.write_text("time,a.x,a.y,a.z\n0,0,0,0\n0.1,0,0,0.1\n", encoding="utf-8")
+    assert told_unit(bare) is None
+    bare.with_suffix(".json").write_text('{"units": "cm"}', encoding="utf-8")
+    assert told_unit(bare) == "cm"
 
 
 @pytest.mark.parametrize("seed", range(40))

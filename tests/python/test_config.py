@@ -486,7 +486,7 @@ BAD = [
     ),
     ('file = "swing.npz"', 'file = "no.npz"', "recording[0].file", "relative to the configuration"),
     ('file = "swing.npz"\n', "", "recording[0].file", "add file to [[recording]]"),
-    ('file = "swing.npz"', 'file = "my.toml"', "recording[0].", ".npz"),
+    ('file = "swing.npz"', 'file = "my.toml"', "recording[0].", "it is a configuration"),
     ("fit = [0.0, 0.2]", "fit = [0.2, 0.0]", "recording[0].fit", "smaller number first"),
     ("fit = [0.0, 0.2]", "fit = [5.0, 6.0]", "recording[0].fit", "within the recording"),
     ("held_out = [0.2, 0.31]", "held_out = [0.2, 3.0]", "recording[0].held_out", "end at 0.31 s"),

@@ -184,7 +184,7 @@ def test_a_finer_mesh_is_counted_where_it_can_be_made_and_named_where_not(tmp_pa
     assert alone.result.not_counted == ("mesh not counted",) and "mesh not counted" in alone.report()
     alone.save(tmp_path / "fit.json")
     assert sb.FitResult.load(tmp_path / "fit.json").not_counted == alone.result.not_counted
-    assert alone["rope_EI"].verdict == "identified" and off(alone["rope_EI"], 2e-3) > 2
+    assert alone["rope_EI"].verdict == "doubtful" and off(alone["rope_EI"], 2e-3) > 2
     finer = sb.Refinement(finer=lambda: [replace(rope(20), recording=recording)], linear=True)
     found = sb.fit(coarse, parameters=wanted, profiles=False, refine=finer)
     assert found.result.not_counted == () and dict(found.on_mesh) == alone.values
@@ -242,7 +242,8 @@ def test_a_refit_on_a_finer_mesh_begins_near_its_end(monkeypatch: pytest.MonkeyP
     assert made.moved == approx(moves(problem.parameters, u, plain.u), rel=1e-6)
 
 
-def test_a_refinement_that_has_no_answer_is_named_and_does_not_end_the_fit():
+def test_a_refinement_that_has_no_answer_is_named_and_does_not_end_the_fit(monkeypatch):
+    monkeypatch.setattr("sheetbend.experiment.checks.ENDLESS", np.inf)  # so that such a substep is tried
     recording = of_sixty_links()
     coarse = replace(rope(10, 3e-3), recording=recording)
     broken = replace(rope(20), recording=recording, solver=sb.Solver(h=1e-300))

@@ -125,7 +125,7 @@ def test_the_center_of_a_body_is_a_particle() -> None:
     origin, frame = box.pose(motion)
     assert motion.positions[:, 0] == pytest.approx(origin + frame @ [0.01, 0.0, 0.02], abs=1e-14)
     assert (box.pose(motion.nodes)[1] == frame).all()
-    with pytest.raises(sb.SceneError, match=r"box\.pose.*axes.*Fix: give a trajectory"):
+    with pytest.raises(sb.SceneError, match=r"box\.motion.*axes.*Fix: give a trajectory"):
         box.pose(motion.positions)
 
 

@@ -96,7 +96,7 @@ class Watched:
 
 OTHERS: dict[str, Callable[[Any], Any]] = {
     "fit_many": lambda watched: sb.fit_many(watched, ["rope_EI"]),
-    "fit_rope": lambda watched: fit_rope([watched], density=0.1, gravity=(0.0, 0.0, -9.81)),
+    "fit_rope": lambda watched: fit_rope(watched, density=0.1, gravity=(0.0, 0.0, -9.81)),
     "fit_pull": lambda watched: fit_pull([watched]),
     "fit_fabric": lambda watched: fit_fabric(watched, watched, ["warp"]),
     "fit_tests": fit_tests,

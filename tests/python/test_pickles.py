@@ -391,6 +391,16 @@ def test_a_dict_with_markers_is_read(tmp_path: Path, name: str, protocol: int) -
     np.testing.assert_allclose(rated.times, np.arange(5) / 240)
 
 
+def test_times_and_markers_of_a_dict_that_are_wrong_are_refused(tmp_path: Path) -> None:
+    for times in (np.arange(4.0), np.array([0.0, 1.0, 1.0, 2.0, 3.0])):
+        with pytest.raises(RecordingError, match="must be 5 rising times, one for each frame"):
+            Recording.load(stored(tmp_path, {"positions": FRAMES, "time": times}))
+    with pytest.raises(RecordingError, match="entry 0"):
+        Recording.load(stored(tmp_path, {"positions": [[[1.0, 2.0], [3.0], [4.0]]] * 5}))
+    silent = Recording.load(stored(tmp_path, {"positions": FRAMES, "rate": None}))
+    np.testing.assert_allclose(silent.times, np.arange(5) / 100)
+
+
 def test_frames_that_hold_nothing_show_no_marker(tmp_path: Path) -> None:
     for nothing in (None, [], np.zeros((3, 0))):
         recording = Recording.load(stored(tmp_path, [FRAMES[0], nothing, *FRAMES[2:]]))

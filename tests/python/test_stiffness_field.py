@@ -134,7 +134,7 @@ def test_what_fits_no_field_is_refused() -> None:
     wanted = as_parameters(["toy_E"], [e])
     with pytest.raises(sb.InputError, match=r"smooth.rope: names no field .*toy_stiffness"):
         with_fields(wanted, [e], {"rope": sb.Smooth()})
-    with pytest.raises(sb.InputError, match=r"smooth.toy_stiffness.length: must be positive"):
+    with pytest.raises(sb.InputError, match=r"smooth.length: must be positive"):
         with_fields(wanted, [e], {"toy_stiffness": sb.Smooth(length=-1.0)})
     with pytest.raises(sb.InputError, match=r"has modes that are parameters already.*toy_stiffness_2"):
         with_fields(as_parameters(["toy_E", "toy_stiffness_2"], [e]), [e], {"toy_stiffness": sb.Smooth()})

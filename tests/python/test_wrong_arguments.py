@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sheetbend as sb
+from sheetbend.arrays.checks import is_number, some_indices
 from wrong_calls import CALLS
 
 LONGEST = 20.0  # s of the processor, for one call
@@ -99,7 +100,20 @@ def test_every_public_function_is_called() -> None:
     """A new public name gets a call in `wrong_calls.py`, or a reason here to have none."""
     without = {
         *("Arm", "Body", "Cloth", "ContactCounts", "ContactMode", "Equilibrium", "Fit", "FitResult", "ForceBalance"),
-        *("Gradient", "GradientReport", "Joint", "Place", "Plan", "Rod", "Rollout", "Rope", "Score", "Scores", "Solid"),
+        *(
+            "Gradient",
+            "GradientReport",
+            "Joint",
+            "ManyFit",
+            "Place",
+            "Plan",
+            "Rod",
+            "Rollout",
+            "Rope",
+            "Score",
+            "Scores",
+            "Solid",
+        ),
         *("TapePlan", "Trajectory"),  # results, which functions make
         *("Grip", "Cloud", "SolidMesh", "TriangleMesh"),  # by class methods, and with `mesh.`
         *("Junction", "fit_rope"),  # no arguments; many recordings
@@ -107,6 +121,14 @@ def test_every_public_function_is_called() -> None:
     called = {name.split(" ")[0].split(".")[0] for name in CALLS}
     public = {n for n in sb.__all__ if callable(getattr(sb, n)) and not _is_error(getattr(sb, n))}
     assert public - called - without == set()
+
+
+def test_infinity_in_single_precision_is_no_number() -> None:
+    assert is_number(np.float32(3.0)) and not is_number(np.float32(np.inf))
+
+
+def test_one_index_in_an_array_without_axes() -> None:
+    assert some_indices("held", np.array(2), 5) == [2]
 
 
 def _is_error(found: object) -> bool:

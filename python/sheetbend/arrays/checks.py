@@ -10,15 +10,17 @@ from numpy.typing import ArrayLike
 from ..errors import InputError, SceneError
 
 MOST = float(np.finfo(float).max)
+"""The largest number that is finite."""
 MOST_WHOLE = 2**31 - 1
 """The largest whole number that the core takes."""
 
 
 def numbers(field: str, values: ArrayLike, error: type[InputError], copy: bool = False) -> np.ndarray:
-    """values as float64, where they are none yet or a `copy` is wanted in a new array; NaN and infinity are numbers.
+    """values as float64, of any shape; NaN and infinity may be among them. A float64 array is not copied unless asked.
 
     Raises:
-        InputError: of the class `error`: texts, complex numbers, ragged rows, a tensor that has a gradient, ...
+        InputError: of the class `error`, for texts, truth values, complex numbers, ragged rows, a tensor that has a
+            gradient, and numbers too large for a float.
     """
     try:
         array = np.array(values) if copy else np.asarray(values)
@@ -55,7 +57,8 @@ def is_number(value: object) -> bool:
     """Whether a value is a finite real number."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         return False
-    return bool(-MOST <= value <= MOST)
+    known = float(value) if isinstance(value, np.floating) else value  # as a float32, MOST would be infinite
+    return bool(-MOST <= known <= MOST)
 
 
 def is_bound(value: object) -> bool:
@@ -136,7 +139,10 @@ def indices(field: str, values: ArrayLike, count: int) -> list[int]:
 
 def some_indices(field: str, values: ArrayLike, count: int) -> list[int]:
     """`indices`, of which there may be none."""
-    none = isinstance(values, Sequence | np.ndarray | set) and len(values) == 0 and not isinstance(values, str)
+    if isinstance(values, np.ndarray):
+        none = values.size == 0
+    else:
+        none = isinstance(values, Sequence | set) and len(values) == 0 and not isinstance(values, str)
     return [] if none else indices(field, values, count)
 
 

@@ -57,8 +57,11 @@ def cloth_figures(found: Fit, c: Comparison) -> dict[str, Axes]:
 
 
 def stiffness_figures(found: Fit) -> dict[str, Axes]:
-    """The first panel of each figure of a stiffness that varies over a cloth, by name of the field: its stiffness, the
-    intervals, and how much of the prior the recordings leave."""
+    """Draw the stiffness of each cloth on which it varies, its intervals, and the share of the prior that is left.
+
+    Returns:
+        The first panel of each figure, by name of the field.
+    """
     cloths = [cloth for c in found.comparisons for cloth in c.experiment.scene.cloths.values()]
     known = {cloth.field.name: cloth for cloth in cloths if cloth.field is not None}
     drawn = [(f, known[f.name]) for f in found.result.fields if f.name in known]

@@ -68,10 +68,11 @@ def load_ropes(config: GrippedConfig, folder: Path) -> list[RopeData]:
 
 
 def _fitted_too(train: Screened, unseen: Screened) -> list[str]:
-    """Words on recordings that are to be predicted unseen, and are fitted."""
+    """Warn of recordings in `unseen` that are fitted too."""
     fitted = {m.recording.positions.tobytes(): m.recording.name for m in train}
     return [
-        f"{m.recording.name} of eval has the same positions as {name} of train: its error is not that of an unseen one"
+        f"{m.recording.name} of eval has the same positions as {name} of train: its error is not that of an unseen "
+        "recording"
         for m in unseen
         if (name := fitted.get(m.recording.positions.tobytes())) is not None
     ]

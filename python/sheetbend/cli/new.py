@@ -21,7 +21,7 @@ from ..look.draft import Draft, draft
 from ..look.robot import Poses
 from ..look.seen import seen
 from ..look.take import Measured, Take
-from ..recording.io.sidecar import beside
+from ..recording.io import told_unit
 from ..recording.recording import Recording
 from ..recording.relabeled import shuffled
 from ..recording.unit_doubt import LONGEST, unit_doubt, unit_words
@@ -266,6 +266,5 @@ def _read(file: Path, units: str | None) -> tuple[Recording, str | None, str]:
         recording = Recording.load(file, doubt)
         why = f"because nothing that is recorded like this is larger than {LONGEST:g} m"
         return recording.mended(), doubt, unit_words(recording, doubt, why)
-    told = file.suffix.lower() == ".npz" or "units" in recording.metadata or "units" in beside(file)
     why = "because the file does not say its unit"
-    return recording.mended(), None, "" if told else unit_words(recording, "m", why)
+    return recording.mended(), None, "" if told_unit(file) is not None else unit_words(recording, "m", why)

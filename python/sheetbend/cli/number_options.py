@@ -1,4 +1,4 @@
-"""Commands that say what is wrong with a number of theirs: that it has a unit, or a comma."""
+"""Commands whose errors say what is wrong with a number: it has a unit, or a decimal comma."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 
 
 def saying_numbers(function: Callable[..., Any]) -> type[TyperCommand]:
-    """The class of a command that refuses a text for a number with the text and the fix, before it parses the rest.
+    """Make the class of a command that refuses a text in place of a number. The error shows the text and the fix.
 
     Args:
-        function: of the command, with its options as annotations.
+        function: the function of the command, with its options as annotations.
     """
     kinds = _kinds(function)
 
@@ -64,4 +64,4 @@ def _fix(text: str) -> str:
         return "give a number"
     if found[0] == bare and bare != text:
         return f"write {bare}, with a point as decimal mark"
-    return "give a whole number" if found[0] == bare else "write the number without its unit, which --help names"
+    return "give a whole number" if found[0] == bare else "write the number without its unit; --help names the unit"

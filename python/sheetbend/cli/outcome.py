@@ -77,7 +77,7 @@ def run(command: Callable[[Console], Outcome], as_json: bool) -> None:
 
 
 def _told(outcome: Outcome) -> Outcome:
-    """An outcome after it was printed as JSON; bad input where stdout is full."""
+    """Print an outcome as JSON and return it; if stdout is full, the outcome is that of bad input."""
     try:
         print(json.dumps(strict({**outcome.data, "exit_code": int(outcome.code)}), allow_nan=False), flush=True)
     except OSError as error:

@@ -24,7 +24,7 @@ class Screen(Console):
         super().__init__(stderr=stderr, width=width, highlight=False, markup=False, emoji=False)
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """Print as rich does; a command whose stream is full goes on, and says so on stderr."""
+        """Print as rich does. If the stream is full, the command continues, and a message on stderr says so."""
         try:
             super().print(*objects, **options)
         except OSError as error:
@@ -34,7 +34,7 @@ class Screen(Console):
                 Screen(stderr=True).print(f"stdout cannot be written: {error.strerror}; the command goes on without it")
 
     def on_broken_pipe(self) -> None:
-        """Go on where nobody reads any more, as behind `| head`: results are still to be written."""
+        """Continue if nobody reads the output any more, as in `| head`, so that results are still written."""
         self.quiet = True
         silence(self.file)
 
@@ -49,7 +49,7 @@ class Screen(Console):
 
 
 def silence(stream: IO[str]) -> None:
-    """Let what is written to a stream from now on, or still waits in it, go nowhere."""
+    """Discard what is written to a stream from now on, or still waits in it."""
     with suppress(OSError, ValueError):  # no file, as in tests
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())

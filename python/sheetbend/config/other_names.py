@@ -1,4 +1,4 @@
-"""What other programs and people call the keys of a configuration: for errors about unknown keys."""
+"""Names that other programs and people give to the keys of a configuration, for errors about unknown keys."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Directions in which grips, clamps and driven bodies hold what they hold, and what a turn of each changes of inputs.
+"""Directions in which grips, clamps and driven bodies hold, and what a turn of each changes in the inputs of a scene.
 
 A grip that is turned against its poses stays turned by the same angle in its own axes. So the axis of the turn moves
-along with the grip, from where it lies at the start of the motion. A rope that does not twist shows one direction of
-its grip only; the grip's axes are then carried along by the shortest rotations.
+with the grip, from its direction at the start of the motion. A rope without twist shows only one direction of its
+grip; the grip's axes are then carried along by the shortest rotations.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Stiffnesses that a model takes as alike along two directions, because only one was given: the weft of a cloth as its
+"""Stiffnesses that a model takes as equal in two directions, because only one was given: the weft of a cloth as its
 warp, its bending and its twist along the weft, and the second bending stiffness of a rod.
 
-Each stands in the inputs as the root of its ratio to the first one, a plain number. On a motion that shows the soft
-direction alone, a fit of one number for both takes the soft one for both, and leaves hardly more than noise.
+The inputs hold the root of the ratio of the second to the first, a plain number. If a motion shows only the soft
+direction, a fit of one number for both finds the soft one, and its residuals are hardly larger than the noise.
 """
 
 from __future__ import annotations

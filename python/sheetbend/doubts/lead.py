@@ -1,8 +1,8 @@
-"""How much rope there is between a clamp or a grip and what is measured from there on, where it is not what was told.
+"""Tests how far a rope sticks out of a clamp or a grip, if this differs from the given length.
 
 A rope sticks out of its clamp by some millimeters more or less than was measured, while the distances of its markers
-from each other are right. That is three errors at once: of the place of the clamp along the rope, of the rope's length,
-and of how far all markers are from the clamp. One of the three alone does not explain what such a fit leaves.
+from each other are right. These are three errors at once: of the place of the clamp along the rope, of the rope's
+length, and of how far all markers are from the clamp. One of the three alone does not explain the residuals.
 """
 
 from __future__ import annotations

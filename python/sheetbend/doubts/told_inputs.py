@@ -1,4 +1,4 @@
-"""Told numbers that change inputs of a scene and are no quantities: gravity, colliders, what drives a scene, grips,
+"""Given numbers that change inputs of a scene and are not quantities: gravity, colliders, what drives a scene, grips,
 loads, the speed at the start, and the mass of markers."""
 
 from __future__ import annotations

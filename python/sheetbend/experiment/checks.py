@@ -12,7 +12,7 @@ from ..recording.windows import Window
 from ..scene.scene import Scene
 from .force_sensor import ForceSensor
 
-MOST_SUBSTEPS = 1e8  # of a recording: more take days
+ENDLESS = 1e8  # substeps of a motion: more take days
 LOSSES = ("squares", "soft_l1", "huber", "cauchy")  # the last for clouds alone
 
 
@@ -67,8 +67,11 @@ def check_parts(
 
 def _is_window(window: object) -> bool:
     """Whether it is a pair of times, of which infinite ones are open ends."""
-    pair = isinstance(window, Sequence | np.ndarray) and not isinstance(window, str) and len(window) == 2
-    return pair and all(is_bound(t) for t in window)  # type: ignore[attr-defined]
+    if isinstance(window, np.ndarray):
+        window = window.tolist()  # a number, where it has no axes
+    if isinstance(window, str) or not isinstance(window, Sequence):
+        return False
+    return len(window) == 2 and all(is_bound(t) for t in window)
 
 
 def check_substep(h: float, times: np.ndarray, of: str = "the recording") -> None:
@@ -86,7 +89,7 @@ def check_substep(h: float, times: np.ndarray, of: str = "the recording") -> Non
     if len(times) < 2:
         return
     span, interval = float(times[-1] - times[0]), float(np.median(np.diff(times)))
-    if span / h > MOST_SUBSTEPS:
+    if span / h > ENDLESS:
         problem, fix = f"makes {span / h:.2g} substeps of {span:.4g} s", f"give such as {interval / 10:.3g}"
         raise InputError("solver.h", problem, h, fix)
     if h <= span and not (h > 1.0 and h > 10.0 * interval):

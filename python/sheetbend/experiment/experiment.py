@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.checks import check_kind
 from ..errors import InputError, RecordingError
 from ..motion.solver import Solver
 from ..objects.markers import Place, places_for
@@ -17,6 +16,7 @@ from ..quantities.quantities import Term, product
 from ..recording.cloud import Cloud
 from ..recording.recording import Recording
 from ..recording.windows import Window
+from ..scene.given import check_scene
 from ..scene.scene import Scene
 from .checks import check_driven_sigma, check_errors, check_forces, check_parts, check_substep
 from .correction import Correction, recorded_noise
@@ -96,7 +96,7 @@ class Experiment:
     def __post_init__(self) -> None:
         if not isinstance(self.recording, Recording):
             raise InputError("recording", "is no Recording", self.recording, "read the file: sb.Recording.load(path)")
-        check_kind("scene", self.scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
+        check_scene(self.scene)
         object.__setattr__(self, "solver", Solver.given(self.solver))
         if not self.name:
             object.__setattr__(self, "name", self.recording.name)

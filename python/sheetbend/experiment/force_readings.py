@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _core
-from ..arrays.checks import check_kind, finite
+from ..arrays.checks import finite
 from ..errors import InputError
 from ..motion.core_terms import divergence
 from ..motion.solver import Solver
 from ..objects.markers import on_particle
 from ..recording.force_recording import ForceRecording
 from ..recording.recording import Recording
+from ..scene.given import check_scene
 from ..scene.scene import Scene
 from .experiment import Experiment
 from .force_sensor import ForceSensor
@@ -98,7 +99,7 @@ def readings_problem(
     Raises:
         InputError: unknown quantities, or values that make no sense.
     """
-    check_kind("scene", scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
+    check_scene(scene)
     experiment = Experiment(
         scene=scene,
         recording=Recording(np.zeros((2, 1, 3)), np.array(span)),

@@ -52,7 +52,8 @@ def alike(recordings: Sequence[Recording], units: bool = True) -> tuple[list[Rec
 
 def _along(recording: Recording) -> tuple[Recording, list[str]]:
     """The recording with its markers in the order in which the shortest line joins them, where more than neighbors are
-    exchanged (`mend` puts these back)."""
+    exchanged (`mend` puts these back). Names stay with places along the rope: the first name is then that of the first
+    marker on it."""
     positions = steadied_order(recording)[0]
     if _order(positions) is None:
         return recording, []
@@ -101,14 +102,15 @@ def _in_one_unit(recordings: Sequence[Recording], units: bool) -> tuple[list[Rec
     """In meters, in which a rope is no longer than any, and as long as in most others."""
     lengths = np.array([np.nansum(long_chords(r.positions)) for r in recordings])
     words: list[list[str]] = [[] for _ in recordings]
-    if not len(lengths) or not (lengths > 0.0).all():
+    seen = lengths[lengths > 0.0]  # the others show no link, and keep their unit
+    if not len(seen):
         return list(recordings), words
-    plausible = lengths[lengths <= LONGEST] if units else lengths
+    plausible = seen[seen <= LONGEST] if units else seen
     if len(plausible):
         usual = float(np.median(plausible))
     else:
-        middle = recordings[int(np.argsort(lengths)[len(lengths) // 2])]
-        usual = float(np.median(lengths)) * METERS[unit_doubt(middle) or "m"]
+        middle = recordings[int(np.argsort(lengths)[len(lengths) - len(seen) + len(seen) // 2])]
+        usual = float(np.median(seen)) * METERS[unit_doubt(middle) or "m"]
     found = []
     for recording, length, said in zip(recordings, lengths.tolist(), words, strict=True):
         factor = next((f for f in FACTORS if abs(length / (f * usual) - 1.0) < SAME), 1.0)

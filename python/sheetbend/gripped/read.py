@@ -1,4 +1,4 @@
-"""What recordings of a rope show, without what is wrong with them: where a fit begins."""
+"""Reads what recordings of a rope show, after errors in them are corrected. A fit begins with the result."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from .slips import held, slips, slips_said
 
 @dataclass(frozen=True)
 class Read:
-    """What recordings show, without what is wrong with them.
+    """What recordings show, after errors in them are corrected.
 
     Attributes:
         motions: of the grips and markers.
-        notes: what was mended, left out or found on the way.
+        notes: what was corrected, left out or found.
         gravities: m/s^2, that the rope may have, the usual one first.
     """
 

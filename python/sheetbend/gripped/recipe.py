@@ -14,9 +14,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays.checks import is_number
 from ..errors import InputError
 from ..fitting.fit import Fit
 from ..minimum.journal import journaled
@@ -187,11 +187,11 @@ def _check(
     starts: int | None,
     validate: float,
 ) -> None:
-    """Raises InputError where a number is none that it could be."""
-    if density is not None and not (np.isfinite(density) and density > 0):
+    """Raises InputError where a number is out of its range, or there is no recording."""
+    if density is not None and not (is_number(density) and density > 0):
         fix = "weigh the rope and give kg/m, or leave it out: then EI/density is fitted"
         raise InputError("density", "must be positive", density, fix)
-    if marker_mass is not None and not (np.isfinite(marker_mass) and marker_mass >= 0):
+    if marker_mass is not None and not (is_number(marker_mass) and marker_mass >= 0):
         raise InputError("marker_mass", "must be zero or more", marker_mass, "weigh a marker and give kg")
     if marker_mass and density is None:
         fix = "weigh the rope too and give its density, or leave it out"
@@ -200,7 +200,7 @@ def _check(
         raise InputError("recordings", "are empty", 0, "give at least one")
     if starts is not None:
         check_count(starts)
-    if not 0 <= validate < 1:
+    if not (is_number(validate) and 0 <= validate < 1):
         raise InputError("validate", "must be a share below 1", validate, "give such as 0.25")
 
 

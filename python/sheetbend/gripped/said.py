@@ -14,7 +14,7 @@ def found_gravity(model: RopeModel, meant: Sequence[Sequence[float]]) -> list[st
     if len(meant) < 2 or model.gravity == meant[0]:
         return []
     along = ", ".join(f"{g:.3g}" for g in model.gravity)
-    return [f"no gravity is given; it is taken as [{along}] m/s^2, since the rope sags along it and moves as it asks"]
+    return [f"no gravity is given; [{along}] m/s^2 is assumed, since the rope sags along it and it predicts better"]
 
 
 def found_late(late: float) -> list[str]:

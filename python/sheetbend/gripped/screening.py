@@ -17,9 +17,9 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import RecordingError
+from ..errors import InputError, RecordingError
 from ..recording.recording import Recording
-from .alike import alike
+from .alike import FEWEST, alike
 from .end_links import usual_links
 from .mend import mended, steadied_order
 from .motion import Array, GrippedMotion, gripped_ends
@@ -28,7 +28,6 @@ from .stretch import longest_stretch
 
 LEFT_OUT = " is left out: "
 MOST_NAMED = 3  # recordings of which the same is said
-FEWEST = 3  # recordings, from which one may be compared with the others
 OTHER = 0.02  # relative difference of length, and of marker places over the length, that another rope has at least
 SCATTERED = 6.0  # the same over the median difference of the others
 
@@ -71,6 +70,10 @@ def screened(recordings: Sequence[Recording | GrippedMotion], smoothing: float, 
     """
     if isinstance(recordings, Screened):
         return recordings
+    for i, recording in enumerate(recordings):
+        if not isinstance(recording, Recording | GrippedMotion):
+            fix = "give what sb.read_recordings returns"
+            raise InputError(f"recordings[{i}]", "must be a Recording", recording, fix)
     kept: list[GrippedMotion] = []
     notes: list[tuple[str, str]] = []
     errors: list[RecordingError] = []

@@ -202,7 +202,7 @@ def _gripped_end(s: Seen, found: Held, at: str, way: tuple[int, ...]) -> None:
         f"{pair[0]} and {pair[1]} are gripped: they give the place and the direction, and the rope is free "
         f"from {names[way[1]]} on"
     )
-    found.unknown.append(f"whether the rope runs through {pair[0]} and {pair[1]}, as it is taken to do")
+    found.unknown.append(f"whether the rope runs through {pair[0]} and {pair[1]}, as is assumed")
 
 
 def _led_end(s: Seen, found: Held, at: str, way: tuple[int, ...]) -> None:

@@ -1,4 +1,4 @@
-"""What a draft says of a rope: its length and density, the model for it, and how its motion begins."""
+"""The model of a rope in a draft: its length and density, how it is held, and how its motion begins."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ NUMBERS = 1500  # of a hand's motion, three for every fitted frame: so many are 
 
 
 class Known(NamedTuple):
-    """A number that a motion does not tell: its value, whether it was measured, and what is said of it."""
+    """A number that a motion does not show: its value, whether it was measured, and a sentence about it."""
 
     value: float
     measured: bool
@@ -42,7 +42,7 @@ class Load(NamedTuple):
 
 
 class Start(NamedTuple):
-    """How the rope begins: keys of its section, and what is said of it."""
+    """How the rope begins: keys of its section, and sentences about it."""
 
     keys: dict[str, Any]
     said: list[str]

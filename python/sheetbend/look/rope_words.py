@@ -1,4 +1,4 @@
-"""What a draft of a rope says: what is seen of it, and what is not known."""
+"""The sentences in a draft of a rope: what the recording shows, and what is not known."""
 
 from __future__ import annotations
 

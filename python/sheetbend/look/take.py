@@ -16,7 +16,7 @@ from .text import table
 @dataclass(frozen=True)
 class Take:
     """A recording for a draft: what it shows, how the configuration calls its file and its unit, and a sentence about
-    the unit where there is one to say."""
+    the unit, if there is one."""
 
     seen: Seen
     file: str

@@ -211,8 +211,8 @@ def tetrahedra(size: ArrayLike, cells: Sequence[int], at: ArrayLike = (0.0, 0.0,
 def _checked_elements(values: ArrayLike, count: int) -> Indices:
     """(m, 8) or (m, 4) indices of different vertices, of which each of `count` is used."""
     array = whole(values)
-    if array.ndim != 2 or array.shape[1] not in FACES or not len(array) or not np.issubdtype(array.dtype, np.integer):
-        got = (array.shape, str(array.dtype))
+    if array.ndim != 2 or array.shape[1] not in FACES or not len(array):
+        got = (values.shape, str(values.dtype)) if isinstance(values, np.ndarray) else values
         fix = "give vertex indices, eight for a brick or four for a tetrahedron"
         raise MeshError("elements", "must be whole numbers of shape (m, 8) or (m, 4), m at least 1", got, fix)
     bad = np.flatnonzero(((array < 0) | (array >= count)).any(axis=1))

@@ -42,8 +42,8 @@ def vertices_within(vertices: Array, lower: ArrayLike, upper: ArrayLike) -> Indi
 def checked_triangles(values: ArrayLike, count: int) -> Indices:
     """(m, 3) indices of different vertices below `count`."""
     array = whole(values)
-    if array.ndim != 2 or array.shape[1] != 3 or len(array) == 0 or not np.issubdtype(array.dtype, np.integer):
-        got = (array.shape, str(array.dtype))
+    if array.ndim != 2 or array.shape[1] != 3 or len(array) == 0:
+        got = (values.shape, str(values.dtype)) if isinstance(values, np.ndarray) else values
         raise MeshError("triangles", "must be whole numbers of shape (m, 3), m at least 1", got, "give vertex indices")
     bad = np.flatnonzero(((array < 0) | (array >= count)).any(axis=1))
     if bad.size:

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _core
-from ..arrays.checks import MOST_WHOLE, check_kind, finite
+from ..arrays.checks import MOST_WHOLE, finite
 from ..errors import DivergenceError, InputError, UnbalancedError, UnconvergedError
 from ..quantities.kinds import KINDS
 from ..scene.compiled import CompiledScene
+from ..scene.given import check_scene
 from ..scene.scene import Scene
 
 MOST_SUBSTEPS = MOST_WHOLE
@@ -25,7 +26,7 @@ def compiled_of(scene: Scene) -> CompiledScene:
     Raises:
         InputError: it is no scene.
     """
-    check_kind("scene", scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
+    check_scene(scene)
     return scene.compiled
 
 

@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import check_count, is_number
+from ..arrays.checks import MOST_WHOLE, check_count, is_number
 from ..errors import InputError
 from ..scene.compiled import CompiledScene
 from ..scene.domain import NOT_NEGATIVE, POSITIVE
 from ..scene.scene import Scene
-from .core_terms import MOST_SUBSTEPS, compiled_of, divergence, substeps
+from .core_terms import compiled_of, divergence, substeps
 from .gradient_probe import DIFFERENCES_BOUND, JITTERS, LOUD, Probe, jittered
 from .gradient_report import COMPLEX_STEP_BOUND, GradientReport, GradientRow
 from .solver import Solver
@@ -63,8 +63,8 @@ def check_gradients(
     steps = substeps(times, solver.h)
     if steps[-1] == 0:
         raise InputError("times", "hold no substep to check", times, f"give frames up to {4 * solver.h:g} s or later")
-    check_count("samples", samples, 1, MOST_SUBSTEPS, InputError)
-    check_count("seed", seed, 0, MOST_SUBSTEPS, InputError)
+    check_count("samples", samples, 1, MOST_WHOLE, InputError)
+    check_count("seed", seed, 0, MOST_WHOLE, InputError)
     if seconds is not None and not (is_number(seconds) and seconds > 0):
         raise InputError("seconds", "must be positive", seconds, "give s, or leave it out")
     core = solver.core(compiled)

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from numpy.typing import ArrayLike
 
 from .. import _core
-from ..arrays.checks import check_count
+from ..arrays.checks import MOST_WHOLE, check_count
 from ..errors import InputError
 from ..files.memory import expect_room, free_memory, in_words, least_in_words
 from ..scene.scene import Scene
-from .core_terms import MOST_SUBSTEPS, compiled_of, substeps
+from .core_terms import compiled_of, substeps
 from .solver import Solver
 
 
@@ -93,7 +93,7 @@ def tape_plan(scene: Scene, times: ArrayLike, solver: Solver | None = None, scen
             free memory.
     """
     solver = Solver.given(solver)
-    check_count("scenes", scenes, 1, MOST_SUBSTEPS, InputError)
+    check_count("scenes", scenes, 1, MOST_WHOLE, InputError)
     return planned(solver.core(compiled_of(scene)), substeps(times, solver.h), solver, solver.budget, scenes)
 
 

@@ -22,9 +22,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import check_kind, check_label, finite, is_number
+from ..arrays.checks import check_label, finite, is_number
 from ..errors import SceneError
 from ..quantities.quantities import Term
+from ..scene.given import check_scene
 from ..scene.scene import Scene
 from .arm_data import Arm
 from .pivot import SLIP_ANGLE, add_resistance
@@ -175,7 +176,7 @@ def _hang(
     """Particles at points (along, across) of the arm, in parts of its length, the end first; their initial state by
     angle and rate."""
     check_label("arm.name", name)
-    check_kind("scene", scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
+    check_scene(scene)
     carrier = pivot if isinstance(pivot, Arm) else None
     root = pivot.root if isinstance(pivot, Arm) else finite(f"{name}.pivot", pivot, (3,), SceneError)
     scene.add_quantity(f"{name}_length", length, "m")

@@ -14,6 +14,7 @@ from ..arrays.checks import check_count, check_kind, check_label, check_positive
 from ..errors import SceneError
 from ..mesh import TriangleMesh
 from ..quantities.quantities import Term
+from ..scene.given import check_scene
 from ..scene.scene import Array, Scene
 from .cloth_cut import Bending, Cut, Stretching
 from .flat_size import FlatSize
@@ -174,7 +175,7 @@ def add_cloth(
         SceneError: wrong or missing values, or others than those of a cut before; a mesh whose diagonals bias bending.
     """
     check_label("cloth.name", name)
-    check_kind("scene", scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
+    check_scene(scene)
     check_kind(f"{name}.mesh", mesh, TriangleMesh, MESH, SceneError)
     if not isinstance(law, Law | None):
         raise SceneError(f"{name}.law", "is no law", law, "give such as sb.laws.Sinh(warp, weft, shear)")

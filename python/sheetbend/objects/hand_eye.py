@@ -79,7 +79,7 @@ class HandEye:
 
     def directions(self, d: ArrayLike) -> Array:
         """Directions (..., 3) of the poses' frame in the recording's frame, without the correction."""
-        return rotated(self.quaternion, vectors(f"{self.name}.points", d))
+        return rotated(self.quaternion, vectors(f"{self.name}.directions", d))
 
     def corrected(self, x: Array, values: Mapping[str, float]) -> Array:
         """Points (..., 3) m of the recording's frame, moved by the correction; quantities not in `values` are zero."""

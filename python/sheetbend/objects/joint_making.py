@@ -8,11 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import check_kind, check_label, finite, is_number
+from ..arrays.checks import check_label, finite, is_number
 from ..errors import SceneError
 from ..quantities.expression import Array, Expression, cross, expressions, numbers, terms_of, vector
 from ..quantities.quantities import ZERO_OR_MORE, Term
 from ..scene.body import AXES, GROUND, PLACE, Body, FrameState, HasMotion
+from ..scene.given import check_scene
 from ..scene.scene import Scene
 from .chain import first_value, unit_vector
 from .grip import any_across
@@ -51,7 +52,7 @@ class Joint:
 
 def ground(scene: Scene) -> Body:
     """The body that stands for the world: pinned at its origin, along its axes. It has no quantities."""
-    check_kind("scene", scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
+    check_scene(scene)
     if GROUND not in scene.bodies:
         x, mass = np.vstack([np.zeros(3), np.eye(3)]), np.array([1.0, 1e-12, 1e-12, 1e-12])
         nodes = scene.add_hidden(x, mass, pinned=True)

@@ -9,10 +9,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import check_count, check_kind, check_label, check_positive
+from ..arrays.checks import check_count, check_label, check_positive
 from ..errors import SceneError
 from ..quantities.quantities import product
 from ..scene.body import BodyPoint
+from ..scene.given import check_scene
 from ..scene.scene import Array, Scene
 from .chain import MOST_LINKS, add_drag, add_links, add_masses
 from .grip import Grip
@@ -179,7 +180,7 @@ def add_rod(
     )
     check_yield(name, yield_curvature, yield_share, "EI")
     check_label("rod.name", name)
-    check_kind("scene", scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
+    check_scene(scene)
     check_count(f"{name}.segments", segments, 2, MOST_LINKS)
     check_count(f"{name}.turns", turns, -MOST_LINKS, MOST_LINKS)
     for label, damping, of, stiffness in (("stretch", stretch_damping, "EA", EA), ("shear", shear_damping, "GA", GA)):

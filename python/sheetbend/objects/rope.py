@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import check_kind, check_positive, some_indices
+from ..arrays.checks import check_positive, some_indices
 from ..errors import SceneError
 from ..scene.body import BodyPoint
+from ..scene.given import check_scene
 from ..scene.scene import Array, Scene
 from .body_end import STUB
 from .chain import (
@@ -164,7 +165,7 @@ def add_rope(
     Raises:
         SceneError: wrong or missing values; the message names the field.
     """
-    check_kind("scene", scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
+    check_scene(scene)
     way = straight_way(direction, clamp_start, clamp_end)
     shape, length = straight_or_given(name, length, segments, start, way, points)
     grips = checked_grips(name, (grip_start, grip_end), (clamp_start, clamp_end))

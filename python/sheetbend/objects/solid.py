@@ -15,6 +15,7 @@ from ..arrays.checks import check_kind, check_label, check_positive, finite, is_
 from ..errors import SceneError
 from ..mesh import SolidMesh, TriangleMesh
 from ..quantities.quantities import Term
+from ..scene.given import check_scene
 from ..scene.scene import Array, Scene
 from .locking import LockingWarning, locking
 from .solid_clusters import SHARE, SolidClusters, volumes_of
@@ -165,7 +166,7 @@ def add_solid(
         SceneError: wrong or missing values, or others than those of a solid of the same material before.
     """
     check_label("solid.name", name)
-    check_kind("scene", scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
+    check_scene(scene)
     check_kind(f"{name}.mesh", mesh, SolidMesh, "give such as sb.mesh.bricks(size, cells)", SceneError)
     numbers = _checked_numbers(name, density, E, poisson, orthotropic, clusters, damping, law, volume_row)
     numbers |= check_plastic(name, yield_stress, hardening, mesh, numbers)

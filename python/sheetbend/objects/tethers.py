@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from ..arrays.checks import check_kind, indices, is_number
 from ..errors import SceneError
 from ..optional import require
+from ..scene.given import check_scene
 from ..scene.scene import Scene
 from .cloth import Cloth
 
@@ -32,7 +33,7 @@ def add_tethers(
         SceneError: no anchors, or a negative stretch or compliance.
         MissingExtraError: scipy is not installed (extra `fit`).
     """
-    check_kind("scene", scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
+    check_scene(scene)
     check_kind("cloth", cloth, Cloth, "give what sb.add_cloth returns")
     name = f"{cloth.name}_tethers"
     if not (is_number(stretch) and stretch >= 0):

@@ -9,13 +9,14 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import check_kind, finite, is_number, vectors
+from ..arrays.checks import finite, is_number, vectors
 from ..arrays.poses import checked_poses, poses_at
 from ..arrays.rotations import rotated, rotation_vectors
 from ..errors import SceneError
 from ..quantities.quantities import ZERO_OR_MORE
 from ..recording.io.poses import read_poses
 from ..scene.colliders import Collider
+from ..scene.given import check_scene
 from ..scene.scene import Scene
 from .hand_eye import HandEye
 
@@ -131,7 +132,7 @@ class Tool:
         Raises:
             SceneError: shapes, NaN, or particles that are driven already.
         """
-        check_kind("scene", scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
+        check_scene(scene)
         which = scene.node_array("tool.particles", particles)
         at = self.held(scene.nodes[which]) if points is None else points
         path = self.path(finite("tool.points", at, (len(which), 3), SceneError))

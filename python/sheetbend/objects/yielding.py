@@ -1,5 +1,5 @@
-"""What is said of yield: of a rod and a cloth a curvature (of a cloth also a shear) and a share, which belong together;
-of a solid a stress and its hardening."""
+"""Checks the arguments of yield: a curvature (of a cloth also a shear strain) and a share, which belong together, of a
+rod and a cloth; a stress and its hardening of a solid."""
 
 from __future__ import annotations
 

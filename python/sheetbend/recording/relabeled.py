@@ -57,6 +57,8 @@ def put_back(t: Array, positions: Array, names: Sequence[str]) -> tuple[Array, l
     The places of markers are extrapolated from the frames before. Where several markers are far from theirs, and each
     is at that of another one of them, they have exchanged their labels.
     """
+    if len(t) < 3:  # nothing can turn suddenly
+        return positions.copy(), []
     x, noise = positions.copy(), timeseries.noise(t, positions)
     floor = NOISY * float(np.nanmedian(noise)) if np.isfinite(noise).any() else 0.0
     said, step = [], float(np.median(np.diff(t)))

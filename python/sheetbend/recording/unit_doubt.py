@@ -18,12 +18,12 @@ def extent(recording: Recording) -> float:
 
 
 def unit_words(recording: Recording, unit: str, why: str) -> str:
-    """What a unit that nobody gave makes of a recording, and what others would.
+    """Say how large a recording is in a unit that was assumed, and in others.
 
     Args:
         recording: in m, by `unit`.
-        unit: that was taken.
-        why: it was, a clause.
+        unit: the assumed unit.
+        why: the reason for it, a clause.
     """
     size = extent(recording) / METERS[unit]
     others = ", ".join(f"in {other} {short(size * METERS[other], 3)} m" for other in METERS if other != unit)

@@ -1,4 +1,4 @@
-"""What a report tells of stiffness fields with a smoothness prior."""
+"""The part of a report on stiffness fields with a smoothness prior."""
 
 from __future__ import annotations
 
@@ -26,8 +26,9 @@ def stiffness_fields(result: FitData) -> list[Section]:
     few = {f.name: f.finest for f in result.fields if f.finest is not None and f.finest < UNSEEN}
     if few:
         told = ", ".join(f"{name} ({100 * left:.0f} %)" for name, left in few.items())
-        why = "of the prior's variance is left in the finest modes. The data therefore show finer modes too"
-        notes.append(("too few modes", f"{told}: {why}, which change the estimates. Give more stiffness_modes"))
+        why = f"the data leave less than {100 * UNSEEN:.0f} % of the prior's variance in the finest modes"
+        then = "They also show modes that are finer still, which change the estimates. Give more stiffness_modes"
+        notes.append(("too few modes", f"{told}: {why}. {then}"))
     return [Section("Stiffness fields", headers, tuple(rows), tuple(notes)), *map(_places, result.fields)]
 
 

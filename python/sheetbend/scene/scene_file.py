@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.checks import check_kind
 from ..errors import SceneError
 from ..files.whole import written
 from .compiled import specification
 from .contact_file import written_contacts
+from .given import check_scene
 from .scene import Scene
 from .scene_reader import (
     LONGEST_HEADER,
@@ -75,7 +75,7 @@ def load_scene(path: str | Path) -> Scene:
 
 
 def _header(scene: Scene) -> dict[str, Any]:
-    check_kind("scene", scene, Scene, "give what sb.Scene() or sb.rope(...) returns")
+    check_scene(scene)
     scene.freeze()
     named: dict[str, Any] = {
         "name": scene.name,

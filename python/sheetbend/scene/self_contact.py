@@ -59,8 +59,8 @@ class SelfTouchingScene(HeldScene):
         if pairs is not None and not (is_number(pairs) and pairs == int(pairs) and pairs > 0):
             raise SceneError("self_contact.pairs", "must be a positive number", pairs, "give one, or leave it out")
         check_label("self_contact.name", name)
-        given: list[Any] = list(radius) if isinstance(radius, Sequence | np.ndarray) else [radius] * len(own)
-        radii: list[float] = given
+        given: Any = radius.tolist() if isinstance(radius, np.ndarray) else radius  # a number, where it has no axes
+        radii: list[Any] = list(given) if isinstance(given, Sequence) else [given] * len(own)
         if len(radii) != len(own) or not all(is_number(r) and r > 0 for r in radii):
             fix = f"give m, one for all or {len(own)}, one for each piece"
             raise SceneError("self_contact.radius", "must be positive", radius, fix)

@@ -120,7 +120,7 @@ class FabricFit:
                 m.name,
                 f"{short(m.value, 4)} +/- {short(m.sigma, 2)}",
                 str(r),
-                f"{(r.laboratory - m.value) / m.sigma:+.1f}",
+                f"{round((r.laboratory - m.value) / m.sigma, 1) + 0.0:+.1f}",  # and not -0.0
             )
             for m, r in zip(self.measured, self.readings, strict=True)
         )

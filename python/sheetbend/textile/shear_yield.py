@@ -1,5 +1,5 @@
-"""From a loop of shear to the yield of a cloth (`sb.add_cloth`): its whole shear stiffness, the share of it that
-slides, and the shear strain beyond which it does."""
+"""Finds the yield of a cloth in shear (`sb.add_cloth`) from a loop of a shear test: the whole shear stiffness, the
+share of it that slides, and the shear strain beyond which it slides."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ class ShearYield:
     """Result of `shear_yield`.
 
     Attributes:
-        shear: G of small motion, as `add_cloth` takes it: the slope after a turn without the tension's part. KES reads
-            (1 - yield_shear_share) G and that part.
+        shear: G at small strain, as `add_cloth` takes it: the slope after a turn, minus the tension. KES reads
+            (1 - yield_shear_share) G plus the tension.
         yield_shear_share: the part of G that slides.
-        yield_shear: the shear strain, tangent of the angle, before yarns slide.
-        hysteresis: height of the loop, 2 yield_shear_share shear yield_shear: 2HG where both ways slide.
-        offset: the force at zero angle before anything slid.
-        misfit: root mean square of what the law leaves of the forces, over the height of the loop.
+        yield_shear: the shear strain (tangent of the angle) beyond which yarns slide.
+        hysteresis: height of the loop, 2 yield_shear_share shear yield_shear: 2HG where yarns slide in both directions.
+        offset: the force at zero angle before anything has slid.
+        misfit: root mean square of the residual forces, divided by the height of the loop.
         estimates: shear, yield_shear_share and yield_shear with their 95 % intervals.
     """
 
@@ -42,16 +42,16 @@ class ShearYield:
 
 
 def shear_yield(curve: Curve, *, tension: float = 1e3 * GRAM_FORCE) -> ShearYield:
-    """Fit a spring beside one that slides to all points of a curve in their order, by least squares.
+    """Fit a spring, parallel to a spring that slides, to all points of a loop of shear by least squares.
 
-    F = G (s - share set) + tension s + offset with the shear strain s, the tangent of the angle, where the set, zero at
-    first, follows s at the distance `yield_shear`. After a turn the slope is G + tension, and (1 - share) G + tension
-    from twice the yield on. The hysteresis of a KES test differs between 2HG at 0.5 and 2HG5 at 5 degrees where yarns
-    lock or begin to slide one after another, which `misfit` shows.
+    The force per width is F = G (s - share set) + tension s + offset. The shear strain s is the tangent of the angle.
+    The set is zero at first and follows s at the distance `yield_shear`. After a turn the slope is G + tension; beyond
+    twice the yield it is (1 - share) G + tension. If yarns lock, or begin to slide one after another, the hysteresis
+    of a KES test differs between 0.5 degrees (2HG) and 5 degrees (2HG5). `misfit` shows this.
 
     Args:
-        curve: of shear, from the unsheared specimen on, with at least one turn.
-        tension: across the jaws, N/m, kept over the test; that of KES-FB1, 10 gf/cm. 0 where there is none.
+        curve: a shear test that starts at the unsheared specimen and has at least one turn.
+        tension: across the jaws, N/m, constant during the test. Default: that of KES-FB1, 10 gf/cm. 0 for none.
 
     Raises:
         InputError: no test of shear, one that never turns back, or one without the loop of a spring that slides.

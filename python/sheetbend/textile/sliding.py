@@ -1,8 +1,8 @@
-"""A spring beside one that slides, fitted to a loop: what `bending_yield` and `shear_yield` share.
+"""Fits a spring, parallel to a spring that slides, to a loop. `bending_yield` and `shear_yield` use it.
 
     load = K (x - share set) + taken x + offset
 
-where the set, zero at first, follows the deformation x at a distance: friction between fibers or yarns.
+The set is zero at first and follows the deformation x at a distance. It models friction between fibers or yarns.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ _MOST_LEFT = 0.5  # of the height of a loop: beyond it there is none to see
 
 @dataclass(frozen=True)
 class Sliding:
-    """What a loop shows of a spring beside one that slides.
+    """The spring and the spring that slides, as a loop shows them.
 
     Attributes:
         stiffness, share, distance: K, the part of it that slides, and the distance of the set; 95 % intervals from what
             the law leaves of the loads, whose neighbors may go together.
         offset: the load without deformation before anything slid.
-        misfit: root mean square of what the law leaves of the loads, over the height of the loop.
+        misfit: root mean square of the residual loads, divided by the height of the loop.
     """
 
     stiffness: Estimate
@@ -53,13 +53,13 @@ class Sliding:
 def fit_sliding(
     curve: Curve, x: Array, names: tuple[str, str, str], units: tuple[str, str, str], taken: float = 0.0
 ) -> Sliding:
-    """Fit a spring beside one that slides to all points of a loop in their order, by least squares.
+    """Fit a spring, parallel to a spring that slides, to all points of a loop by least squares.
 
     Args:
         x: (points,) the deformation in which the law is linear.
         names: of stiffness, share and distance.
         units: of the load, the stiffness and the distance.
-        taken: a part of the slope that is no stiffness of the specimen.
+        taken: a part of the slope that is not stiffness of the specimen, such as that of a tension.
 
     Raises:
         InputError: a test that never turns back, or one without the loop of a spring that slides.

@@ -23,15 +23,14 @@ _TORCH: Mapping[str, Callable[[Tensor], Tensor]] = {
     "cos": torch.cos,
     "sqrt": torch.sqrt,
     "inverse_sqrt": torch.rsqrt,
-    "exp": torch.exp,
     "over_one_plus": lambda x: 1.0 / (1.0 + x),
     "over_one_minus_twice": lambda x: 1.0 / (1.0 - 2.0 * x),
 }
 
 
 class ParameterMap:
-    """inputs[target] = base[target] + sum of coefficient * prod f(weight * theta), in the order of
-    adjoint/observe/parameter_map.h; only exponentials have weights other than one.
+    """inputs[target] = base[target] + sum of coefficient * (prod f(theta) * exp(sum weight * theta)), in the order of
+    adjoint/observe/parameter_map.h.
 
     Plain torch operations, so every transform differentiates and batches it by itself.
     """
@@ -41,29 +40,40 @@ class ParameterMap:
         self._base = torch.tensor(arrays["base"], dtype=torch.float64)
         self._target = torch.tensor(arrays["target"], dtype=torch.long)
         self._coefficient = torch.tensor(arrays["coefficient"], dtype=torch.float64)
-        # Each quantity under each function is computed once; terms pick factors from these, ones fill up short terms.
+        # Each quantity under each function is computed once; terms pick factors and exponents from these.
         each = np.stack([arrays["function"], arrays["parameter"], arrays["weight"]], 1).astype(float).reshape(-1, 3)
         distinct, place = np.unique(each, axis=0, return_inverse=True)
         own = {name: distinct[distinct[:, 0] == number] for name, number in FUNCTIONS.items()}
         self._groups = [
             (name, torch.tensor(rows[:, 1], dtype=torch.long), torch.tensor(rows[:, 2])) for name, rows in own.items()
         ]
-        first = np.asarray(arrays["first_factor"])
-        count = np.diff(first)
-        filled = np.full((len(count), int(count.max(initial=0))), len(distinct))
-        for k in range(filled.shape[1]):
-            filled[count > k, k] = place.ravel()[first[:-1][count > k] + k]
-        self._factors = torch.from_numpy(filled)
+        count = np.diff(arrays["first_factor"])
+        term, grows = np.repeat(np.arange(len(count)), count), each[:, 0] == FUNCTIONS["exp"]
+        one, zero = len(distinct), len(distinct) + 1
+        self._factors = _rows(term[~grows], place.ravel()[~grows], len(count), one)
+        self._exponents = _rows(term[grows], place.ravel()[grows], len(count), zero)
 
     def __call__(self, theta: Tensor) -> Tensor:
         """(..., quantities) to (..., total)."""
         batch = theta.shape[:-1]
-        functions = [_TORCH[name](weight * theta.index_select(-1, which)) for name, which, weight in self._groups]
-        values = torch.cat([*functions, theta.new_ones(*batch, 1)], -1)
-        product = self._coefficient
+        arguments = [(name, weight * theta.index_select(-1, which)) for name, which, weight in self._groups]
+        functions = [x if name == "exp" else _TORCH[name](x) for name, x in arguments]
+        values = torch.cat([*functions, theta.new_ones(*batch, 1), theta.new_zeros(*batch, 1)], -1)
+        product, exponent = theta.new_ones(()), theta.new_zeros(())
         for column in self._factors.unbind(1):
             product = product * values.index_select(-1, column)
+        for column in self._exponents.unbind(1):
+            exponent = exponent + values.index_select(-1, column)
+        product = self._coefficient * (product * torch.exp(exponent))
         return self._base.expand(*batch, -1).index_add(-1, self._target, product.expand(*batch, -1))
+
+
+def _rows(term: np.ndarray, place: np.ndarray, terms: int, none: int) -> Tensor:
+    """(terms, most) the places of each term, in their order; short rows are filled up with `none`."""
+    count = np.bincount(term, minlength=terms)
+    rows = np.full((terms, int(count.max(initial=0))), none)
+    rows[term, np.arange(len(term)) - np.repeat(np.cumsum(count) - count, count)] = place
+    return torch.from_numpy(rows)
 
 
 class InputMap:

@@ -77,6 +77,19 @@ def _read(path: Path, units: str | None) -> MarkerData:
     return sidecar.apply(file_format.read(path), path, units, _assumed(file_format))
 
 
+def told_unit(path: Path) -> str | None:
+    """The length unit that the file at path, or the JSON beside it, tells; None where neither does.
+
+    Raises:
+        RecordingError: as `Recording.load` does.
+    """
+    with reading(path):
+        told = sidecar.beside(path).get("units")
+        if told is None and not path.is_dir():
+            told = "m" if path.suffix.lower() == ".npz" else _format(path).read(path).metadata.get("units")
+        return told
+
+
 def write(recording: MarkerData, path: Path) -> None:
     """Write the recording and the JSON beside it; see `Recording.save`."""
     file_format = _format(path)

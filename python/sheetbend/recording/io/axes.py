@@ -1,7 +1,8 @@
-"""Which axis of an array of markers is which, where its file stores them in another order than its reader expects.
+"""Finds the order of the axes of an array of markers, if a file stores them in another order than its reader expects.
 
-The coordinates are the axis of length 3. Of the other two, frames are the one along which the markers go less far than
-they are from each other. A fourth coordinate that all markers share, and that rises from frame to frame, is the time.
+The axis of length 3 holds the coordinates. Of the other two, the one along which positions change by less than the
+distance between markers holds the frames. A fourth coordinate that all markers share, and that rises from frame to
+frame, holds the times.
 """
 
 from __future__ import annotations

@@ -2,14 +2,14 @@
 
     a list of frames, each an array (3, markers) or three lists of numbers; or one array (frames, 3, markers)
 
-Markers stand in order along the rope. NaN means not seen, and so does an entry that holds nothing; a marker that is
-never seen is left out. The files say neither times nor which markers are driven: 100 frames per second and two markers
+Markers are in order along the rope. NaN means not seen, and so does an empty entry. A marker that is never seen is
+left out. The files say neither times nor which markers are driven: 100 frames per second and two markers
 in each grip (0, 1, -2, -1) are assumed, as in that data; `rate` and `clamped` in the JSON beside the file replace them.
 Lengths are in the unit of that JSON, meters without one; the axes are those of the source, so say `gravity` there when
 z does not point up.
 
-Others store the same in another order of axes (`axes`), or in a dict, beside times or a rate. That is read too where it
-is clear, and the recording's `mends` say so.
+Another order of the axes (`axes`), and a dict that also holds times or a rate, are read if they are clear. The
+recording's `mends` then report it.
 
 Layout: Chen et al. 2024, Differentiable Discrete Elastic Rods for Real-Time Modeling of Deformable Linear Objects. The
 pickles are read by `plain_pickle`, which runs nothing that they name.
@@ -55,7 +55,7 @@ def read(path: Path) -> MarkerData:
     Raises:
         RecordingError: it is no pickle, is damaged, names anything but NumPy arrays, or the shape is another.
     """
-    content, named = plain_pickle.arrays(path), {}
+    content, named = plain_pickle.arrays(path, needed=POSITIONS), {}
     if isinstance(content, dict):
         named = content
         content = _markers_of(path, named)
@@ -64,7 +64,7 @@ def read(path: Path) -> MarkerData:
         raise RecordingError(str(path), problem, shape, _other_axes(shape))
     positions, times, words = _positions(path, list(content))
     if times is None:
-        times = _times_of(named, len(positions))
+        times = _times_of(path, named, len(positions))
     if times is None:
         times = np.arange(len(positions)) / RATE
         if "rate" not in sidecar.beside(path):
@@ -106,15 +106,24 @@ def _axes(entry: plain_pickle.Content) -> int:
     return 1 + max((frame.ndim for frame in entry), default=0)
 
 
-def _times_of(named: Mapping[str, plain_pickle.Content], frames: int) -> Array | None:
-    """(frames,) s that stand beside the markers in a dict, or that its rate gives."""
+def _times_of(path: Path, named: Mapping[str, plain_pickle.Content], frames: int) -> Array | None:
+    """(frames,) s that stand beside the markers in a dict, or that its rate gives.
+
+    Raises:
+        RecordingError: times that are not one for each frame, or do not rise; a rate that is none.
+    """
     for name, entry in named.items():
         unit = clock.unit(name)
-        stamps = np.asarray(entry, dtype=float) if unit is not None and _axes(entry) == 1 else np.zeros(0)
-        if stamps.shape == (frames,) and (np.diff(stamps) > 0.0).all():
-            return (stamps - stamps[0]) / clock.PER_SECOND.get(unit or "s", 1)
+        if unit is None or _axes(entry) != 1:
+            continue
+        stamps = np.asarray(entry, dtype=float)
+        if stamps.shape != (frames,) or not (np.diff(stamps) > 0.0).all():
+            fix = 'mend them, or store "rate", the frames per second, in their place'
+            problem = f"must be {frames} rising times, one for each frame"
+            raise RecordingError(f"{path}: {name}", problem, f"{stamps.size} times", fix)
+        return (stamps - stamps[0]) / clock.PER_SECOND.get(unit, 1)
     for name, entry in named.items():
-        if name.lower() in RATES and np.size(entry) == 1:
+        if name.lower() in RATES and np.size(entry) == 1 and not np.isnan(np.asarray(entry, dtype=float)).any():
             return np.arange(frames) / sidecar.rate(float(np.asarray(entry).reshape(())))
     return None
 

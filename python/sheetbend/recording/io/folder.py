@@ -31,17 +31,17 @@ def read_recordings(
         unseen = sb.read_recordings("ropes/eval", "*.pkl")
 
     Args:
-        folder: where the files lie; if it holds none, and one folder below it does, those. Files that no reader knows,
-            such as the JSON beside a recording, are left out. Or one file.
-        pattern: which files, as for `Path.glob`; "*/*" looks one folder below. Files that end in .txt are read only
-            where the pattern does, too.
+        folder: the folder of the files, or one file. If the folder holds no recording, but a single folder below it
+            does, that one is read. Files that no reader knows, such as the JSON beside a recording, are left out.
+        pattern: which files, as for `Path.glob`; "*/*" looks one folder below. Files that end in .txt are read only if
+            the pattern also ends in .txt.
         units: length unit of the files, as for `Recording.load`.
-        refused: where given, gets the errors of files that cannot be read, by file name, and the others are read. Files
-            of laboratories that are not read (`ELSEWHERE`), such as .mat, are among them.
+        refused: if given, a file that cannot be read does not stop the others. The errors are stored here by file
+            name, also those of other kinds of files that laboratories use (`ELSEWHERE`), such as .mat.
 
     Returns:
-        As `Recording.load` reads them, each name once: files of the same name in several folders have that of their
-        folder before it, such as monday_00.
+        The recordings, as `Recording.load` reads them. If files in several folders have the same name, the name of the
+        folder is put before it, such as monday_00.
 
     Raises:
         RecordingError: the folder does not exist or holds no recording of that pattern, two recordings have the same
@@ -50,6 +50,8 @@ def read_recordings(
     root = Path(folder)
     if not isinstance(pattern, str) or not pattern or Path(pattern).is_absolute():
         raise RecordingError("pattern", "is no pattern of names", pattern, "give such as '*.csv'")
+    if not isinstance(refused, dict | None):
+        raise RecordingError("refused", "must be a dict", refused, "give an empty one")
     known = [suffix for suffix in FORMATS if suffix != NOTES or pattern.lower().endswith(NOTES)]
     files, others = _files(root, pattern, known)
     errors = {file.name: _of_another_kind(file) for file in others}

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import math
 import pickletools
-from collections.abc import Callable, Iterable
-from contextlib import suppress
+from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -60,10 +59,14 @@ _AGAIN = "export or copy the file again"
 Content = NDArray[Any] | list[NDArray[Any]]
 
 
-def arrays(path: Path) -> Content | dict[str, Content]:
+def arrays(path: Path, needed: Collection[str] = ()) -> Content | dict[str, Content]:
     """The array that the pickle at `path` holds, or its list (or tuple) of arrays, or of lists of rows of numbers, or a
     dict of these by name; of any protocol. An entry of a list that is None is an array without numbers, and a number
     that is None is NaN. What else stands in a dict is left out.
+
+    Args:
+        path: of the pickle.
+        needed: names of what must be arrays if a dict has them, in lower case.
 
     Raises:
         RecordingError: the file is no pickle or a damaged one, names anything but NumPy's plain arrays (which is then
@@ -71,7 +74,7 @@ def arrays(path: Path) -> Content | dict[str, Content]:
     """
     try:
         value = _Machine(path).run(path.read_bytes())
-        return _by_name(path, value) if isinstance(value, _Named) else _content(path, "the pickle", value)
+        return _by_name(path, value, needed) if isinstance(value, _Named) else _content(path, "the pickle", value)
     except NoNumberError as error:
         fix = "store plain numbers, such as float64"
         raise RecordingError(str(path), "holds an array that is not of real numbers", str(error), fix) from None
@@ -85,12 +88,15 @@ def _content(path: Path, what: str, value: object) -> Content:
     return _entries(path, value) if isinstance(value, _Items) else _values(path, what, value)
 
 
-def _by_name(path: Path, named: _Named) -> dict[str, Content]:
+def _by_name(path: Path, named: _Named, needed: Collection[str]) -> dict[str, Content]:
     found: dict[str, Content] = {}
     for name, entry in named.entries.items():
         number = _number(entry)
-        with suppress(RecordingError, NoNumberError):  # texts and names describe the arrays
+        try:
             found[name] = _content(path, name, entry) if number is None else np.array(number)
+        except (RecordingError, NoNumberError):
+            if name.lower() in needed:
+                raise  # others may be texts that describe the arrays
     return found
 
 

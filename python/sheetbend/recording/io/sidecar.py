@@ -7,8 +7,8 @@
     gravity   [x, y, z] in m/s^2, in place of what the file's format says
     rate      frames per second, Hz, for files that hold no times (the first frame is at 0 s); elsewhere metadata
 
-The JSON beside the folder that the file lies in (`train.json` of `train/`) may tell units, clamped, gravity and rate of
-all of its files; what the file's own says counts.
+The JSON beside the folder of the file (`train.json` beside `train/`) may give units, clamped, gravity and rate of all
+files in the folder. The JSON of a single file takes precedence.
 
 All else is metadata, kept as it stands and in its own units: known values, license, attribution. Text under
 `markers` or `clamped` is a remark, kept as `markers_note` and `clamped_note`; units that say more than the
