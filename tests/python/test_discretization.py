@@ -185,6 +185,7 @@ def test_a_finer_mesh_is_counted_where_it_can_be_made_and_named_where_not(tmp_pa
     alone.save(tmp_path / "fit.json")
     assert sb.FitResult.load(tmp_path / "fit.json").not_counted == alone.result.not_counted
     assert alone["rope_EI"].verdict == "doubtful" and off(alone["rope_EI"], 2e-3) > 2
+    assert "links of 50 mm can look like that" in " ".join(alone.report().split())
     finer = sb.Refinement(finer=lambda: [replace(rope(20), recording=recording)], linear=True)
     found = sb.fit(coarse, parameters=wanted, profiles=False, refine=finer)
     assert found.result.not_counted == () and dict(found.on_mesh) == alone.values

@@ -18,6 +18,8 @@ from ..quantities.wording import short
 from ..scene.scene import Scene
 from .tangents import Input
 
+MESH = 0.25  # of a link: a coarse mesh makes a clamp that is off by less (a tenth in a rope of ten links)
+
 
 @dataclass(frozen=True)
 class Lead:
@@ -27,12 +29,14 @@ class Lead:
         who: its name.
         rope: name of the rope.
         from_start: the end is where places along the rope are counted from.
+        link: length of the link there, m.
         added: what 1 m more of it adds to inputs, beside the rope's length.
     """
 
     who: str
     rope: str
     from_start: bool
+    link: float
     added: list[Input]
 
     @property
@@ -50,7 +54,10 @@ class Lead:
 
     def says(self, size: float) -> str:
         how = "more" if size > 0 else "less"
-        return f"{self.rope} stuck out of what holds it at {self.who} by {short(1e3 * abs(size), 2)} mm {how}"
+        words = f"{self.rope} stuck out of what holds it at {self.who} by {short(1e3 * abs(size), 2)} mm {how}"
+        if abs(size) > MESH * self.link:
+            return words
+        return f"{words} (links of {short(1e3 * self.link, 2)} mm can look like that where no finer mesh is counted)"
 
 
 def leads(scene: Scene, inputs: Array) -> Iterator[Lead]:
@@ -89,7 +96,8 @@ def leads(scene: Scene, inputs: Array) -> Iterator[Lead]:
                 added.append(("position", _entries(scene.places_of(both)), back.ravel()))
             else:
                 continue
-            yield Lead(who, rope.name, end == "start", added)
+            link = float(np.linalg.norm(x[nodes[1]] - x[node]))
+            yield Lead(who, rope.name, end == "start", link, added)
 
 
 def _back(at: Array, along: Array) -> Array:
