@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
+import re
 import signal
 import warnings
 from collections.abc import Iterator
@@ -75,7 +76,7 @@ def complaint(name: str, argument: str, label: str) -> str:
     except (TypeError, ValueError) as error:
         told = str(error).lower()
         named = (
-            argument in told
+            re.search(rf"\b{re.escape(argument.lower())}\b", told) is not None
             or "pathlike" in told
             or ("truth value of an array" in told and isinstance(wrong, np.ndarray))
         )
