@@ -23,4 +23,4 @@ constexpr auto shapes = []<class... S>(std::tuple<S...>*) {
 }  // namespace
 
 extern "C" const sheetbend_contacts::Table SHEETBEND_JOIN(sheetbend_contacts_, SHEETBEND_VARIANT){
-    shapes.data(), &sheetbend::contact_numbers_vjp};
+    shapes.data(), &sheetbend::contact_numbers_vjp, SHEETBEND_VARIANT_NAME};

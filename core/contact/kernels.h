@@ -80,6 +80,7 @@ struct Table {
   // Cotangents of the particles' numbers to those of the states and of inverse masses.
   void (*numbers_vjp)(const Contacts&, const Cotangents&, const Written& x_bar, const Written& x_before_bar,
                       const Written& w_bar);
+  const char* name;  // of the instruction set, as in sheetbend_packs::KernelTable
 };
 
 }  // namespace sheetbend_contacts

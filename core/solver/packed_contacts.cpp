@@ -1,7 +1,8 @@
 #include "core/solver/packed_contacts.h"
 
 #include <algorithm>
-#include <string_view>
+#include <stdexcept>
+#include <string>
 
 #define SHEETBEND_DECLARE(variant) extern "C" const sheetbend_contacts::Table sheetbend_contacts_##variant;
 SHEETBEND_DECLARE(portable)
@@ -60,13 +61,20 @@ sheetbend_contacts::Pass PackedContacts::pass(int iteration, const sheetbend_con
   return p;
 }
 
-const sheetbend_contacts::Table& contact_kernels() {
+const sheetbend_contacts::Table& contact_kernels_of(std::string_view instruction_set) {
+  static constexpr const sheetbend_contacts::Table* tables[] = {
 #ifdef SHEETBEND_X86_KERNELS
-  static const std::string_view name = pack_kernels().name;
-  if (name == "x86-64-v4") return sheetbend_contacts_v4;
-  if (name == "x86-64-v3") return sheetbend_contacts_v3;
+      &sheetbend_contacts_v4, &sheetbend_contacts_v3,
 #endif
-  return sheetbend_contacts_portable;
+      &sheetbend_contacts_portable};
+  for (const auto* table : tables)
+    if (instruction_set == table->name) return *table;
+  throw std::logic_error("packed_contacts.cpp lists no contact kernels of " + std::string(instruction_set));
+}
+
+const sheetbend_contacts::Table& contact_kernels() {
+  static const sheetbend_contacts::Table& chosen = contact_kernels_of(pack_kernels().name);
+  return chosen;
 }
 
 const sheetbend_contacts::Kernels& contact_kernels(const Scene& scene, const SweptGroup& group) {

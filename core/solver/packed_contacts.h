@@ -2,6 +2,7 @@
 // scenes go one after the other, each as it would alone.
 #pragma once
 
+#include <string_view>
 #include <vector>
 
 #include "core/contact/kernels.h"
@@ -73,7 +74,9 @@ void PackedContacts::begin(const ContactSource<T>& source, const SweptGroup& gro
   begin(group, poses, c.collider);
 }
 
-// The kernels of this machine, of the instruction set of pack_kernels(), and of a group's shape.
+// The kernels of an instruction set by its name, which throws std::logic_error where there are none; those of this machine, of the instruction set of
+// pack_kernels(); and those of a group's shape.
+const sheetbend_contacts::Table& contact_kernels_of(std::string_view instruction_set);
 const sheetbend_contacts::Table& contact_kernels();
 const sheetbend_contacts::Kernels& contact_kernels(const Scene& scene, const SweptGroup& group);
 

@@ -73,6 +73,114 @@ INSTANTIATE_TEST_SUITE_P(, ContactPacks,
                          ::testing::Values(Rain{13}, Rain{13, Integrator::bdf2}, Rain{3, Integrator::bdf2},
                                            Rain{8, Integrator::bdf1, 300.0, 0.7}, Rain{11, Integrator::bdf2, 300.0}));
 
+// Colliders whose particles go in packs beside ones whose particles go one by one: a distance field, and a shape off which particles bounce.
+struct Mix {
+  const char* name;
+  bool field, bounces;
+  Integrator integrator = Integrator::bdf1;
+
+  // A contact that lifts a particle is stiffer by `firmness`, and rounding weighs more by that: inputs one unit of their last place apart have
+  // gradients up to 4e-9 apart, in packs or not. Without such contacts they are at most 7e-11 apart.
+  double near(double elastic, double bouncing) const { return bounces ? bouncing : elastic; }
+};
+void PrintTo(const Mix& m, std::ostream* out) { *out << m.name; }
+
+// A chain that falls, a particle that runs into the corner between the plane and a ball, one by itself above the box, and two that run into the corner
+// between the plane and the box.
+Sample mixed(const Mix& m) {
+  ContactBuilder b;
+  const double link = 0.03;
+  const int chain = 13;
+  for (int i = 0; i < chain; ++i)
+    b.particle({link * i, 0.003 * (i % 5), 0.02 + 0.004 * (7 * i % 11)}, 0.002 + 0.0003 * (i % 3),
+               {0.6 - 0.1 * (i % 7), 0.2 * (i % 3), -1.0 - 0.1 * (i % 4)});
+  for (int i = 0; i + 1 < chain; ++i) b.constraint("distance", {i, i + 1}, link / 50.0, {link});
+  b.particle({0.01, 0.04, 0.006}, 0.003, {0.9, -0.5, -0.9});
+  b.particle({0.235, 0.01, 0.03}, 0.002, {0.1, 0.2, -1.5});
+  b.particle({0.24, 0.075, 0.009}, 0.003, {0.0, -1.0, -0.9});
+  b.particle({0.26, 0.075, 0.009}, 0.003, {0.0, -1.0, -0.9});
+  b.constraint("distance", {chain + 2, chain + 3}, link / 50.0, {0.02});
+  b.collider("plane", {}, {0.0, 0.0, 0.0, 0.02, -0.01, 0.3, 0.0, 0.0, 0.003, 0.03, -0.02, 0.3}, {0.0, 0.06});
+  b.collider(m.field ? "distance_field" : "sphere", m.field ? std::vector<double>{} : std::vector<double>{0.022},
+             {0.045, 0.02, 0.008, 0.1, 0.2, 0.0, 0.04, 0.02, 0.009, 0.4, -0.4, -0.5}, {0.0, 0.06});
+  if (m.field) b.spec.colliders.back().grid = ball_on_grid(0.022, 0.0044);
+  b.collider("capsule", {0.03, 0.1}, {0.15, 0.0, -0.015, 1.5, 0.0, 0.0, 0.14, 0.01, -0.02, 1.2, 0.5, 0.0}, {0.0, 0.06});
+  b.collider("rounded_box", {0.04, 0.05, 0.02, 0.002}, {0.24, 0.01, -0.008, 0.0, 0.0, 0.1});
+  b.contact(0.3, 0.003);
+  if (m.bounces) b.spec.contacts[3].bounces = true, b.restitution.push_back(0.3);
+  return b.build(9.81);
+}
+
+// How often contacts touch their points, contact by contact, how often a point is touched by contacts of both ways at a time, and how often one that
+// nothing holds bounces.
+struct Touches {
+  std::vector<int> of_contact;
+  int of_both = 0;
+  std::size_t impacts = 0;
+};
+Touches touches(const Program& p, const std::vector<double>& inputs) {
+  Touches found{std::vector<int>(p.scene.contacts.size())};
+  Rollout<double> rollout(p.scene, p.plan, inputs.data());
+  for (int n = 0; n < p.steps; ++n) {
+    rollout.advance();
+    found.impacts += rollout.impacts().size();
+    std::vector<char> in_packs(p.scene.nodes()), alone(p.scene.nodes());
+    for (const SweptGroup& group : p.plan.contact_groups)
+      for (int i = group.first; i < group.first + group.count; ++i) {
+        const SweptContact& c = p.plan.contacts[i];
+        if (rollout.contact_modes()[p.scene.contacts[c.contact].first + c.item] == ContactMode::apart) continue;
+        ++found.of_contact[c.contact];
+        (group.packed() ? in_packs : alone)[c.node] = true;
+      }
+    for (int node = 0; node < p.scene.nodes(); ++node) found.of_both += in_packs[node] && alone[node];
+  }
+  return found;
+}
+
+struct MixedContacts : ::testing::TestWithParam<Mix> {
+  Sample sample = mixed(GetParam());
+  Program packed = program(sample, Rain{0, GetParam().integrator}), alone = one_by_one(packed);
+};
+
+TEST_P(MixedContacts, HaveTheBitsOfContactsOneByOne) {
+  std::vector<bool> in_packs;
+  for (const SweptGroup& group : packed.plan.contact_groups) in_packs.push_back(group.packed());
+  ASSERT_EQ(in_packs, (std::vector<bool>{true, !GetParam().field, true, !GetParam().bounces}));
+  const Touches found = touches(packed, sample.inputs);
+  for (const int times : found.of_contact) EXPECT_GT(times, 3);
+  EXPECT_GT(found.of_both, 3);
+  EXPECT_EQ(found.impacts > 0, GetParam().bounces);
+  EXPECT_EQ(found.of_contact, touches(alone, sample.inputs).of_contact);
+  EXPECT_TRUE(same_bits(states(packed, sample.inputs), states(alone, sample.inputs)));
+  EXPECT_LE(relative_error(gradient(packed, sample.inputs), gradient(alone, sample.inputs)),
+            GetParam().near(1e-11, 1e-9));
+}
+
+TEST_P(MixedContacts, HaveTheGradientOfComplexSteps) {
+  const auto of = [&](const std::vector<Complex>& probe) { return loss(packed, probe); };
+  expect_sums_agree(sample.scene.layout, of, sample.inputs, gradient(packed, sample.inputs),
+                    GetParam().near(1e-8, 1e-7));
+}
+
+TEST_P(MixedContacts, HaveTheSameBitsInEveryLaneAndWithAnyTape) {
+  expect_bits_of_any_tape(packed, sample.inputs);
+  InputsOfLanes inputs(Pack::lanes, sample.inputs);
+  inputs[3][sample.scene.layout.of(Quantity::velocity) + 2] = -0.7;
+  expect_bits_of_lanes(packed, inputs, {3, 5}, every_state);
+}
+
+INSTANTIATE_TEST_SUITE_P(, MixedContacts,
+                         ::testing::Values(Mix{"Field", true, false}, Mix{"Bounces", false, true},
+                                           Mix{"Both", true, true, Integrator::bdf2}),
+                         [](const auto& info) { return std::string(info.param.name); });
+
+// A name that the two lists do not share would leave contacts to other kernels, or to none.
+TEST(PackedContacts, HaveKernelsOfEveryInstructionSet) {
+  for (const auto* kernels : available_kernels()) EXPECT_STREQ(contact_kernels_of(kernels->name).name, kernels->name);
+  EXPECT_STREQ(contact_kernels().name, pack_kernels().name);
+  EXPECT_THROW(contact_kernels_of("x86-64"), std::logic_error);
+}
+
 // A short pack repeats its last particle.
 TEST(PackedContacts, AreFullButTheLast) {
   const Rain rain{13};

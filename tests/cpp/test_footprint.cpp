@@ -121,6 +121,28 @@ TEST(FootprintOfContacts, IsWhatIsAllocated) {
   expect_footprint<Dual<double, 1>>(sample.scene, swept, {sample.inputs.begin(), sample.inputs.end()});
 }
 
+// Beside that plane one that goes one by one in plain numbers, because it is a distance field or because particles bounce off it.
+TEST(FootprintOfMixedContacts, IsWhatIsAllocated) {
+  for (const bool field : {false, true}) {
+    ContactBuilder b;
+    for (int i = 0; i < 300; ++i) b.particle({0.01 * i, 0.0, 0.1}, 0.001);
+    for (int i = 0; i + 1 < 300; ++i) b.constraint("distance", {i, i + 1}, 0.01 / 50.0, {0.01});
+    b.collider("plane", {}, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0});
+    b.collider(field ? "distance_field" : "plane", {}, {0.0, 0.0, -0.1, 0.0, 0.0, 0.0});
+    if (field) b.spec.colliders.back().grid = ball_on_grid(0.05, 0.01);
+    b.contact(0.3, 0.0);
+    if (!field) b.spec.contacts[1].bounces = true, b.restitution.push_back(0.5);
+    const Sample sample = b.build(9.81);
+    SolverOptions sweeps = contact_options(1e-3);
+    sweeps.partition = Partition::gauss_seidel, sweeps.iterations = 5;
+    const Plan plan = make_plan(sample.scene, sweeps);
+    ASSERT_TRUE(plan.contact_groups[0].packed() && !plan.contact_groups[1].packed());
+    expect_footprint<double>(sample.scene, plan, sample.inputs);
+    expect_footprint<Pack>(sample.scene, plan, {sample.inputs.begin(), sample.inputs.end()});
+    expect_footprint<Dual<double, 1>>(sample.scene, plan, {sample.inputs.begin(), sample.inputs.end()});
+  }
+}
+
 TEST_P(Footprint, KeepsToTheBudget) {
   const Sample sample = random_scene(78, GetParam().shape());
   const Plan plan = make_plan(sample.scene, GetParam().options(2));
