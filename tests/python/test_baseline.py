@@ -51,6 +51,8 @@ def test_rest_is_the_mean_of_what_is_seen() -> None:
     assert two.tolist() == [[4.5, 0.0, 0.0], [0.0, 0.0, 4.0]]
     with pytest.raises(RecordingError, match="at least one"):
         rest_baseline([])
+    with pytest.raises(RecordingError, match=r"at least one in a list \(got 3"):
+        rest_baseline(3)
     with pytest.raises(RecordingError, match=r"m0, m1"):
         rest_baseline([recording, recording.select([1])])
 

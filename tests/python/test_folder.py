@@ -120,3 +120,22 @@ def test_hidden_files_are_no_recordings_and_files_of_laboratories_are_named(tmp_
     (tmp_path / "1.pkl").unlink()
     with pytest.raises(sb.RecordingError, match=r"2\.pkl\.gz: is of a kind that is not read .*gunzip"):
         sb.read_recordings(tmp_path)
+
+
+def test_refused_files_of_one_name_in_two_folders_are_both_told(tmp_path: Path) -> None:
+    dataset(tmp_path, "a/1.npz", "b/2.npz")
+    for name in ("a/0.csv", "b/0.csv"):
+        (tmp_path / name).write_text("nothing")
+    (tmp_path / "a" / "x.mat").write_text("nothing")
+    (tmp_path / "b" / "x.mat").write_text("nothing")
+    refused: dict[str, sb.RecordingError] = {}
+    assert [r.name for r in sb.read_recordings(tmp_path, "*/*", refused=refused)] == ["1", "2"]
+    assert sorted(refused) == ["a/0.csv", "a/x.mat", "b/0.csv", "b/x.mat"]
+
+
+@pytest.mark.parametrize("text", ['{"units": ', "[1]"])
+def test_a_malformed_json_beside_a_folder_is_told_as_that_of_the_folder(tmp_path: Path, text: str) -> None:
+    dataset(tmp_path / "train", "a.npz")
+    (tmp_path / "train.json").write_text(text)
+    with pytest.raises(sb.RecordingError, match=r"train\.json: is read as the JSON of the folder train and .*move it"):
+        sb.Recording.load(tmp_path / "train" / "a.npz")

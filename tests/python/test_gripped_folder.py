@@ -194,6 +194,30 @@ READ: dict[str, tuple[Callable[[Folder], object], int, tuple[str, ...]]] = {
         ("its lengths are divided by 1000",),
     ),
     "millimeters in one": (lambda f: f.each(lambda x: frames(1e3 * x), ("01",)), 5, ("01: its lengths are divided",)),
+    "inches in one": (
+        lambda f: f.each(lambda x: frames(x / 0.0254), ("01",)),
+        5,
+        ("01: its lengths are divided by 39.3701",),
+    ),
+    "a rope of 22 m": (lambda f: f.each(lambda x: frames(25.0 * x)), 5, ("its lengths are divided by 100",)),
+    "a rope of 22 m, and meters told beside the folder": (
+        lambda f: (f.each(lambda x: frames(25.0 * x)), beside(f, units="m", rate=100)),
+        5,
+        (),
+    ),
+    "a rope of 22 m, and meters told beside the files": (
+        lambda f: (
+            f.each(lambda x: frames(25.0 * x)),
+            [f.put(f"{part}/{k}.json", b'{"units": "m", "rate": 100}') for part in ("train", "eval") for k in TRAIN],
+        ),
+        5,
+        (),
+    ),
+    "NPZ in millimeters": (
+        lambda f: (f.each(lambda x: npz(1e3 * x), suffix="npz"), clamped(f)),
+        5,
+        ("its lengths are divided by 1000",),
+    ),
     "millimeters told beside the folder": (
         lambda f: (f.each(lambda x: frames(1e3 * x)), beside(f, units="mm", rate=100)),
         5,

@@ -280,7 +280,8 @@ class TestScreened:
         positions = moving()
         positions[lost, marker] = np.nan
         found = screened([recorded(positions + 1e-6 * k, f"{k}") for k in range(3)], 0.08)
-        assert self.names(found) == ["0", "1", "2"] and words in found.notes[0] and len(found.notes) in (1, 3)
+        assert self.names(found) == ["0", "1", "2"] and words in found.notes[0]
+        assert len(found.notes) == (3 if isinstance(marker, slice) else 1)  # free ones: each is named
         assert np.array_equal(found[0].recording.times, TIMES[used])
 
     def test_times_that_jump_cost_part_of_a_recording(self) -> None:
@@ -303,6 +304,16 @@ class TestScreened:
         frozen[100:200, :2] = frozen[100, :2]
         with pytest.raises(sb.RecordingError, match="stood still"):
             screened([recorded(frozen, "a"), recorded(frozen + 1e-6, "b"), recorded(moving(), "c")], 0.08)
+
+    def test_a_recording_that_is_given_twice_counts_once(self) -> None:
+        one, other = recorded(moving(), "one"), recorded(moving(turn=0.1), "other")
+        found = screened([one, other, one], 0.08)
+        assert self.names(found) == ["one", "other"]
+        assert found.notes == ("one is left out: it has the same positions as one",)
+
+    def test_several_that_are_left_out_are_told_in_the_plural(self) -> None:
+        same = [recorded(moving(), f"{k}") for k in range(5)]
+        assert screened(same, 0.08).notes == ("1, 2, 3 and 1 more are left out: they have the same positions as 0",)
 
     def test_motions_stay_and_what_was_screened_is_returned(self) -> None:
         found = screened([recorded(moving())], 0.08)

@@ -305,8 +305,9 @@ def test_windows_are_refused_where_they_cannot_be() -> None:
         replace(swing(), shooting=0.4, static=True)
     with pytest.raises(sb.InputError, match="must be a length"):
         replace(swing(), shooting=-1.0)
-    with pytest.raises(sb.InputError, match="must be at least 1"):
-        replace(swing(), shooting=sb.Shooting(0.4, steps=0))
+    for steps in (0, 2.5, True):
+        with pytest.raises(sb.InputError, match=r"shooting\.steps: must be a whole number, at least 1"):
+            sb.Shooting(0.4, steps=steps)
     many = [replace(swing(), name=f"swing {k}", shooting=0.4) for k in range(20)]
     with pytest.raises(sb.InputError, match="does not go with many recordings"):
         sb.fit_many(many, list(WANTED)[:2])

@@ -137,6 +137,19 @@ def test_boxes_overlap_by_half():
         sb.cluster_boxes(mesh, 0.005)
 
 
+def test_clusters_of_equal_size_may_be_one_array():
+    mesh = sb.mesh.bricks((0.1, 0.02, 0.02), (5, 1, 1))
+    each = np.array([np.arange(16), np.arange(8, 24)])
+    found, listed = (
+        sb.solid(mesh, density=DENSITY, E=E, clusters=clusters).solids["solid"].numbers
+        for clusters in (each, each.tolist())
+    )
+    assert found == listed
+    orthotropic = sb.Orthotropic((E,) * 3, (E,) * 3, (0.0,) * 3)
+    with pytest.raises(sb.SceneError, match="clusters: is given beside orthotropic"):
+        sb.solid(mesh, density=DENSITY, orthotropic=orthotropic, clusters=each)
+
+
 def test_refusals():
     mesh = sb.mesh.bricks((0.1, 0.02, 0.02), (5, 1, 1))
     whole = [np.arange(24)]

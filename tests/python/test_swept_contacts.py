@@ -85,6 +85,8 @@ def test_motion_and_gradient_have_the_same_bits_with_every_instruction_set():
             continue
         assert run.returncode == 0, run.stderr
         found[isa] = run.stdout
+    if len(found) < 2:
+        pytest.skip(f"this machine or build has one instruction set: {', '.join(found)}")
     assert len(set(found.values())) == 1, found
 
 

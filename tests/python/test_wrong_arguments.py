@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sheetbend as sb
-from sheetbend.arrays.checks import is_number, some_indices
+from sheetbend.arrays.checks import check_count, is_number, some_indices
 from wrong_calls import CALLS
 
 LONGEST = 20.0  # s of the processor, for one call
@@ -45,6 +45,8 @@ WRONG: dict[str, Any] = {
     "path": Path("/does/not/exist"),
     "NaNs": np.full((3, 3), math.nan),
     "four axes": np.zeros((2, 2, 2, 2)),
+    "no axes": np.array(1.0),
+    "infinity in single precision": np.float32("inf"),
 }
 NO_NUMBERS = ("text", "NaN", "complex", "texts", "ragged", "object", "path", "NaNs")  # and no lengths, masses, ...
 
@@ -126,6 +128,14 @@ def test_every_public_function_is_called() -> None:
 
 def test_infinity_in_single_precision_is_no_number() -> None:
     assert is_number(np.float32(3.0)) and not is_number(np.float32(np.inf))
+
+
+def test_a_number_out_of_range_is_told_what_to_give() -> None:
+    """Once "give fewer" of a seed, and "give one from 0 to 9223372036854775807"."""
+    with pytest.raises(sb.SceneError, match=r"at least 0 .*give one from 0 on"):
+        check_count("seed", -1, 0, 2**63 - 1)
+    with pytest.raises(sb.SceneError, match=r"at most 4 .*give one from -5 to 4"):
+        check_count("frame", 5, -5, 4)
 
 
 def test_one_index_in_an_array_without_axes() -> None:

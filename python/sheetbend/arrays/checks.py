@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -66,6 +66,16 @@ def is_bound(value: object) -> bool:
     return is_number(value) or (isinstance(value, float) and value in (-np.inf, np.inf))
 
 
+def is_several(value: object) -> bool:
+    """Whether a value holds others that can be taken one by one: a list, a generator, an array with axes; no text."""
+    return isinstance(value, Iterable) and not isinstance(value, str) and getattr(value, "ndim", 1) != 0
+
+
+def is_list(value: object) -> bool:
+    """Whether a value is a list, a tuple or the like, or an array with axes; no text."""
+    return isinstance(value, Sequence | np.ndarray) and is_several(value)
+
+
 def check_label(field: str, name: object) -> None:
     """Refuse what cannot be the name of a part of a scene.
 
@@ -77,15 +87,20 @@ def check_label(field: str, name: object) -> None:
 
 
 def check_count(field: str, value: object, least: int, most: int, error: type[InputError] = SceneError) -> None:
-    """Refuse what is no whole number in a range.
+    """Refuse what is no whole number in a range, such as a number of things, a seed or the number of a frame.
+
+    Args:
+        most: from `MOST_WHOLE` on it is not told, except of a value beyond it.
 
     Raises:
         InputError: of the class `error`.
     """
+    span = f"give one from {least} to {most}"
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise error(field, f"must be a whole number, at least {least}", value, f"give one from {least} to {most}")
+        fix = span if most < MOST_WHOLE else f"give one from {least} on"
+        raise error(field, f"must be a whole number, at least {least}", value, fix)
     if value > most:
-        raise error(field, f"must be at most {most}", value, "give fewer")
+        raise error(field, f"must be at most {most}", value, span)
 
 
 def check_kind(field: str, value: object, kind: type, fix: str, error: type[InputError] = InputError) -> None:

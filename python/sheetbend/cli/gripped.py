@@ -18,7 +18,7 @@ from ..gripped.ladder import AND, BESIDE, CLOCK, MARKERS, REST, ROLLS, SHIFTS, T
 from ..gripped.model import NAME
 from ..gripped.report import overview
 from ..objects.chain import unit_vector
-from ..recording.io.folder import read_recordings
+from ..recording.io.folder import read_recordings, units_told
 from ..recording.recording import Recording
 from ..recording.recording_checks import marker_indices
 from ..report.parameter_table import TABLE, parameter_table
@@ -85,7 +85,8 @@ def _load(section: GrippedRopeSection, where: str, part: str, folder: Path) -> S
         found = _reordered(found, section.reorder, f"{where}.reorder", part)
         if section.clamped is not None:
             found = [replace(r, clamped=marker_indices("clamped", section.clamped, r.markers)) for r in found]
-        motions = screened(found, section.smoothing, section.units is None)
+        told = section.units is not None or units_told(folder, section.pattern, refused)
+        motions = screened(found, section.smoothing, not told)
     except RecordingError as error:
         which = "" if error.field in ("folder", str(folder)) else f"{error.field} "
         raise ConfigError(f"{where}.{part}", f"{which}{error.problem}", error.got, error.fix) from error

@@ -11,7 +11,7 @@ from ..files.units import Length
 from ..gripped import fit_rope
 from ..minimum.starts import MOST
 from .schema import ExperimentSection, OutputSection
-from .section import MOST_LINKS, Finite, Name, Pair, Section, Vector, key
+from .section import MOST_SEGMENTS, Finite, Name, Pair, Section, Vector, key
 
 RungName = Literal["twist", "tilts", "rest", "varying", "yield", "rolls", "clock", "beside", "shifts", "markers"]
 RUNGS: tuple[RungName, ...] = get_args(RungName)
@@ -122,7 +122,7 @@ class GrippedRopeSection(Section):
         ge=1,
         le=MOST,
     )
-    segments: int = key(_default("segments"), "links at the start", ge=4, le=MOST_LINKS)
+    segments: int = key(_default("segments"), "links at the start", ge=4, le=MOST_SEGMENTS)
     max_segments: int = key(
         _default("max_segments"), "links are doubled, up to these, until EI moves by less than 5 %", ge=4
     )

@@ -19,6 +19,13 @@ class Particles:
 
     Numbers of nodes and vertices count on the configured mesh: `finer` tells how many links one configured link of a
     rope has become, and a vertex of a cloth is the one nearest to where it was.
+
+    Attributes:
+        finer: by how many links one configured link of a rope is replaced.
+        named: particles by name of a rope, cloth, solid, arm or set.
+        labels: of these names, the particles that a text names, such as "start".
+        ropes: those names that are ropes' and rods'.
+        arms: by name.
     """
 
     finer: int = 1
@@ -28,7 +35,14 @@ class Particles:
     arms: dict[str, Arm] = field(default_factory=dict)
 
     def free_name(self, path: str, name: str) -> str:
-        """The name, unless it is taken."""
+        """Return a name that nothing has yet.
+
+        Args:
+            path: of the table, for the error.
+
+        Raises:
+            ConfigError: it is taken.
+        """
         if name in self.named:
             raise ConfigError(
                 f"{path}.name",
@@ -39,32 +53,50 @@ class Particles:
         return name
 
     def add(self, name: str, particles: Sequence[int]) -> None:
+        """Give particles a name, so that "NAME:INDEX" finds them."""
         self.named[name] = [int(p) for p in particles]
 
     def add_rope(self, rope: Rope) -> None:
+        """Add the nodes of a rope or rod, with the labels "start" and "end"."""
         self.add(rope.name, rope.particles.tolist())
         self.labels[rope.name] = {"start": int(rope.particles[0]), "end": int(rope.particles[-1])}
         self.ropes.add(rope.name)
 
     def add_cloth(self, cloth: Cloth, configured: TriangleMesh) -> None:
+        """Add a cloth: for each vertex of the configured mesh (m), the particle nearest to it; with the mesh's sets."""
         self.add(cloth.name, cloth.particles[cloth.mesh.nearest(configured.vertices)].tolist())
         self.labels[cloth.name] = _labels(cloth)
 
     def add_solid(self, solid: Solid, configured: SolidMesh) -> None:
+        """Add a solid, in the same way as a cloth."""
         self.add(solid.name, solid.particles[solid.mesh.nearest(configured.vertices)].tolist())
         self.labels[solid.name] = _labels(solid)
 
     def add_arm(self, arm: Arm) -> None:
+        """Add an arm or a pendulum, with the labels "pivot" and "end"."""
         self.add(arm.name, arm.particles)
         self.labels[arm.name] = {"pivot": arm.pivot, "end": arm.end}
         self.arms[arm.name] = arm
 
     def nodes(self, path: str, rope: str, numbers: Sequence[int]) -> list[int]:
-        """Particles of node numbers of a rope."""
+        """Return the particles of a rope's nodes, by their numbers in the configured rope.
+
+        Args:
+            path: of the key, for the error.
+            rope: its name.
+            numbers: from 0, or from -1 down for those counted from the end.
+
+        Raises:
+            ConfigError: the rope has no such node.
+        """
         return [self._entry(path, rope, n) for n in numbers]
 
     def find(self, path: str, reference: str) -> int:
-        """The particle of a reference.
+        """Return the particle of a reference.
+
+        Args:
+            path: of the key, for the error.
+            reference: "NAME", "NAME:INDEX" or "NAME:LABEL".
 
         Raises:
             ConfigError: no such rope or set, or no such entry in it.

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, model_validator
 
-from .section import MOST_LINKS, Finite, Name, Section, Vector, key
+from .section import MOST_SEGMENTS, Finite, Name, Section, Vector, key
 
 
 class RopeGrip(Section):
@@ -95,7 +95,7 @@ class Strand(Section):
     """What ropes and rods share."""
 
     length: Finite | None = key(None, "rest length; that of `points` when left out", "m", gt=0)
-    segments: int = key(40, "number of equal links", ge=1, le=MOST_LINKS)
+    segments: int = key(40, "number of equal links", ge=1, le=MOST_SEGMENTS)
     density: Finite = key(..., "mass per length", "kg/m", gt=0)
     EA: Finite | None = key(None, "axial stiffness; inextensible when left out", "N", gt=0)
     start: Vector = key([0.0, 0.0, 0.0], "where a straight one starts; at the marker of a grip there", "m")
@@ -173,7 +173,7 @@ class Rod(Strand):
 
     name: Name = key("rod", "prefix of its quantities: <name>_EI, <name>_GJ and so on")
     length: Finite = key(..., "rest length, between its grips", "m", gt=0)
-    segments: int = key(40, "number of equal links", ge=2, le=MOST_LINKS)
+    segments: int = key(40, "number of equal links", ge=2, le=MOST_SEGMENTS)
     EI: Finite = key(..., "bending stiffness", "N m^2", gt=0)
     GJ: Finite = key(..., "torsional stiffness", "N m^2", gt=0)
     EI2: Finite | None = key(

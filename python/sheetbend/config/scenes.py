@@ -44,15 +44,21 @@ def build_scene(
     folder: Path = Path(),
     tools: Mapping[str, Tool] | None = None,
 ) -> tuple[Scene, Particles]:
-    """A scene and the meaning of its particle references.
+    """Build a scene, and find what its particle references mean.
 
     Args:
+        name: of the scene.
+        section: the description that all recordings share.
         moment: the recording's part; None without a recording.
         placed: per rope the markers on it, in order along it, for `points = "recording"`.
         finer: multiplies the segments of every rope and the cells of every cloth.
         ropes: names of the ropes and rods to build; None = all.
         folder: files of meshes are relative to it.
         tools: by name, on the scene's clock; none by default.
+
+    Returns:
+        The scene, whose gravity (m/s^2) is that of the section, else that of the recording, else `EARTH`; and its
+        particles by reference.
 
     Raises:
         ConfigError: anything inconsistent, with the path of the table.

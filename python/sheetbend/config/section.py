@@ -14,7 +14,7 @@ Vector = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 Line = Annotated[list[Vector], Field(min_length=2, max_length=2)]
 Counts = Annotated[list[Annotated[int, Field(ge=1, le=1000)]], Field(min_length=2, max_length=2)]
 Pair = Annotated[list[Finite], Field(min_length=2, max_length=2)]
-MOST_LINKS, MOST_CELLS = 20_000, 2_000
+MOST_SEGMENTS, MOST_CELLS = 20_000, 2_000
 """Of a rope, and of a cloth along one direction: more is a slip of the pen, which must not take all memory."""
 NAME, REFERENCE, AXES = r"^[A-Za-z][A-Za-z0-9_.-]*$", r"^[^:\s]+(:\S+)?$", "^[xyz]{1,3}$"
 

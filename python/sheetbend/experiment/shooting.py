@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ..arrays.checks import is_number
+from ..arrays.checks import MOST_WHOLE, check_count, is_number
 from ..errors import InputError
 
 AUTO = "auto"
@@ -55,6 +55,7 @@ class Shooting:
             value = getattr(self, field)
             if value is not None and not (is_number(value) and value >= 0):
                 raise InputError(f"shooting.{field}", "must not be negative", value, "give a number, or leave it out")
+        check_count("shooting.steps", self.steps, 1, MOST_WHOLE, InputError)
 
     @staticmethod
     def given(name: str, wanted: object, beside: Mapping[str, bool]) -> Shooting | None:
@@ -76,10 +77,6 @@ class Shooting:
             raise InputError(field, "must be a length", own.window, "give the length of a window in s, or 'auto'")
         if own.loss is not None and not (is_number(own.loss) and own.loss > 0):
             raise InputError(f"{field}.loss", "must be positive", own.loss, "give it in m/s, or leave it out")
-        if not (is_number(own.steps) and own.steps >= 1):
-            raise InputError(
-                f"{field}.steps", "must be at least 1", own.steps, "give a number of steps, or leave it out"
-            )
         if fields := [other for other, is_given in beside.items() if is_given]:
             raise InputError(field, "does not go with", fields, "leave one of the two out")
         return own

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from ..arrays.checks import is_several
 from ..errors import InputError, choices
 from ..quantities.parameters import Parameter, Parameters
 from ..quantities.quantities import Quantity
@@ -35,7 +36,7 @@ def as_parameters(
     """
     if isinstance(wanted, str):
         raise InputError("parameters", "must be a list of names", wanted, f"write ['{wanted}']")
-    if not isinstance(wanted, Iterable):
+    if not is_several(wanted):
         raise InputError("parameters", "must be a list of names", wanted, "write ['rope_EI']")
     known = quantities_of(experiments)
     each = ((p.name, p) if isinstance(p, Parameter) else (p, None) for p in wanted)

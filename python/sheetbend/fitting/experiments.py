@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from ..arrays.checks import is_several
 from ..errors import InputError
 from ..experiment.experiment import Experiment
 from ..recording.recording import Recording
@@ -45,8 +46,8 @@ def listed(experiments: Iterable[Experiment]) -> list[Experiment]:
     Raises:
         InputError: they are no list, or hold something else.
     """
-    found = list(experiments) if isinstance(experiments, Iterable) else []
-    if not isinstance(experiments, Iterable) or not all(isinstance(e, Experiment) for e in found):
+    found = list(experiments) if is_several(experiments) else []
+    if not is_several(experiments) or not all(isinstance(e, Experiment) for e in found):
         fix = "give a scene with its recording, an sb.Experiment, or a list of them"
         raise InputError("experiments", "hold what is no Experiment", experiments, fix)
     return found

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 
@@ -19,13 +20,16 @@ from ..recording.recording import Recording
 from ..recording.relabeled import put_back
 from ..recording.unit_doubt import LONGEST, unit_doubt
 from .end_links import long_chords
-from .mend import steadied_order
+from .mend import SHORTER, steadied_order
 from .motion import gripped_ends
 
 FEWEST = 3  # recordings, from which one is compared with the others
 MOST_FRAMES = 200  # of a recording, that its order is found from
-SHORTER = 0.8  # line through the markers in another order over the given one, below which that is taken
-FACTORS = (1e3, 1e2, 1e1, 1e-1, 1e-2, 1e-3)  # of units of length
+CLOSE = 5.0  # of two units: a rope that is so much longer than the others may be another rope (an inch has 2.54 cm)
+FACTORS = tuple(
+    sorted({float(f"{a / b:.12g}") for a, b in permutations(METERS.values(), 2) if not 1 / CLOSE < a / b < CLOSE})
+)
+"""One unit of length over another."""
 SAME = 0.05  # relative difference of lengths of one rope in different units
 UNEVEN = 0.02  # median difference of logarithms of the links of a rope and of the same rope the other way round
 CLEAR = 0.5  # of one direction's difference over that of the other, below which it is decided

@@ -18,7 +18,7 @@ class Read:
     """What recordings show, after errors in them are corrected.
 
     Attributes:
-        motions: of the grips and markers.
+        motions: of the grips and markers, in m and s.
         notes: what was corrected, left out or found.
         gravities: m/s^2, that the rope may have, the usual one first.
     """
@@ -36,7 +36,17 @@ class Read:
 def read(
     recordings: Sequence[Recording | GrippedMotion], smoothing: float, gravity: tuple[float, float, float] | None
 ) -> Read:
-    """The motions of recordings, with ropes that slip through their grips held where they were."""
+    """Read the motions of recordings, with ropes that slip through their grips held where they were.
+
+    Args:
+        recordings: of one rope, as `screened` takes them.
+        smoothing: s, over which positions are smoothed.
+        gravity: (3,) m/s^2; None takes what the recordings tell, else what the sag of the rope allows.
+
+    Raises:
+        RecordingError: more than half of the recordings cannot be used.
+        InputError: something else than recordings, or they tell different gravities.
+    """
     usable = screened(recordings, smoothing)
     slipped = [slips(m) for m in usable]
     motions = [held(m, found) for m, found in zip(usable, slipped, strict=True)]

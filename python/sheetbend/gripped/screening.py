@@ -77,17 +77,17 @@ def screened(recordings: Sequence[Recording | GrippedMotion], smoothing: float, 
     kept: list[GrippedMotion] = []
     notes: list[tuple[str, str]] = []
     errors: list[RecordingError] = []
-    again = _repeated([r for r in recordings if isinstance(r, Recording)])
-    own = [r for r in recordings if isinstance(r, Recording) and id(r) not in again]
+    again = _repeated(recordings)
+    own = [r for i, r in enumerate(recordings) if isinstance(r, Recording) and i not in again]
     changed, changes = alike(own, units)
     brought = {id(r): (other, words) for r, other, words in zip(own, changed, changes, strict=True)}
     links = _links(changed)
-    for recording in recordings:
+    for i, recording in enumerate(recordings):
         if isinstance(recording, GrippedMotion):
             kept.append(recording)
             continue
-        if id(recording) in again:
-            notes.append((recording.name, f"{LEFT_OUT}it has the same positions as {again[id(recording)]}"))
+        if i in again:
+            notes.append((recording.name, f"{LEFT_OUT}it has the same positions as {again[i]}"))
             continue
         same, done = brought[id(recording)]
         words: tuple[str, ...] = ()
@@ -117,21 +117,31 @@ def _gathered(notes: Sequence[tuple[str, str]]) -> list[str]:
     of: dict[str, list[str]] = {}
     for name, what in notes:
         of.setdefault(what, []).append(name)
-    return [", ".join(names[:MOST_NAMED]) + _more(len(names)) + what for what, names in of.items()]
+    return [
+        ", ".join(names[:MOST_NAMED]) + _more(len(names)) + (what if len(names) == 1 else _of_several(what))
+        for what, names in of.items()
+    ]
+
+
+def _of_several(what: str) -> str:
+    """What is said of one recording, in the plural."""
+    return what.replace(f"{LEFT_OUT}it has ", " are left out: they have ").replace(LEFT_OUT, " are left out: ")
 
 
 def _more(count: int) -> str:
     return f" and {count - MOST_NAMED} more" if count > MOST_NAMED else ""
 
 
-def _repeated(recordings: Sequence[Recording]) -> dict[int, str]:
-    """By id of a recording the name of an earlier one with the same positions."""
-    first: dict[bytes, Recording] = {}
-    return {
-        id(r): other.name
-        for r in recordings
-        if (other := first.setdefault(hashlib.sha256(r.positions.tobytes()).digest(), r)) is not r
-    }
+def _repeated(recordings: Sequence[Recording | GrippedMotion]) -> dict[int, str]:
+    """By number of a recording the name of an earlier one with the same positions, which may be the same object."""
+    first: dict[bytes, tuple[int, str]] = {}
+    again = {}
+    for i, r in enumerate(recordings):
+        if isinstance(r, Recording):
+            number, name = first.setdefault(hashlib.sha256(r.positions.tobytes()).digest(), (i, r.name))
+            if number != i:
+                again[i] = name
+    return again
 
 
 def _links(recordings: Sequence[Recording]) -> dict[int, Array]:

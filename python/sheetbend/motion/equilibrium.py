@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _core
-from ..arrays.checks import check_kind, finite, is_number, numbers
+from ..arrays.checks import check_kind, finite, is_number, is_several, numbers
 from ..errors import NoEquilibriumError, SceneError, refusal
 from ..scene.scene import Scene
 from .core_terms import compiled_of, forces_by_group, over_all_nodes, pressures_by_volume, start_of
@@ -210,7 +210,8 @@ def equilibria(
     Raises:
         SceneError: as `equilibrium`.
     """
-    check_kind("starts", starts, Iterable, "give a list of positions to start from", SceneError)
+    if not is_several(starts):
+        raise SceneError("starts", "must be a list", starts, "give a list of positions to start from")
     if not (is_number(tolerance) and tolerance >= 0):
         raise SceneError("tolerance", "must not be negative", tolerance, "give m")
     found: list[Equilibrium] = []

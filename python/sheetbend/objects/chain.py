@@ -11,7 +11,7 @@ from ..quantities.quantities import ZERO_OR_MORE, product
 from ..scene.scene import Array, Scene
 
 MOST_LINKS = 10**6
-"""Of one rope: more is a slip of the pen. A configuration allows fewer, `config.section.MOST_LINKS`."""
+"""Of one rope: more is a slip of the pen. A configuration allows fewer, `config.section.MOST_SEGMENTS`."""
 
 TimeConstant = tuple[float, dict[str, str]]
 """A constant and the functions of quantities that it multiplies."""

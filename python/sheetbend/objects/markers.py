@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import check_count, check_kind, finite, is_number, vectors
+from ..arrays.checks import check_count, check_kind, finite, is_list, is_number, vectors
 from ..errors import SceneError
 from ..mesh import Places
 from ..quantities.expression import Array, Expression, expressions
@@ -259,7 +259,7 @@ def _places_for(
         if unknown:
             raise SceneError("markers", "are not in the recording", unknown, f"name some of: {', '.join(names)}")
         return tuple(markers.get(name) for name in names)
-    if isinstance(markers, str) or not isinstance(markers, Sequence | np.ndarray):
+    if not is_list(markers):
         raise SceneError("markers", "must be places", markers, "give a list of places, or a mapping by name")
     if len(markers) != len(names):
         raise SceneError(

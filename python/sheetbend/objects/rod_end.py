@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
+from ..arrays.checks import is_several
 from ..errors import SceneError
 from ..quantities.quantities import Term
 from ..scene.body import BodyPoint
@@ -143,7 +144,7 @@ class End:
 def check_roll(name: str, ends: Sequence[str], held: Sequence[str]) -> None:
     """Raises SceneError where `hold_roll` names something else than an end, or one that a grip, a junction or a body
     holds."""
-    if isinstance(ends, str) or not isinstance(ends, Collection):
+    if not is_several(ends):
         raise SceneError(f"{name}.hold_roll", "must be a list of ends", ends, 'give ("start",), ("end",) or both')
     for end in ends:
         if not isinstance(end, str) or end not in ("start", "end"):

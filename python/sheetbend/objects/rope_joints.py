@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..arrays.checks import is_number
+from ..arrays.checks import is_list, is_number
 from ..errors import SceneError
 from ..quantities.quantities import Term, product
 from ..scene.scene import Array, Scene
@@ -16,8 +16,7 @@ from .rope_grips import Chain
 
 def check_set(name: str, modes: Sequence[int], EI: float | None) -> None:
     """Raises SceneError where the modes of a rest curvature are no whole numbers, or nothing bends."""
-    listed = isinstance(modes, Sequence | np.ndarray)
-    if not listed or any(not is_number(k) or k != int(k) or k < 0 for k in modes):
+    if not is_list(modes) or any(not is_number(k) or k != int(k) or k < 0 for k in modes):
         raise SceneError(f"{name}.set_modes", "must be whole numbers from 0 on", modes, "give such as (0, 1)")
     if len(modes) and EI is None:
         raise SceneError(f"{name}.set_modes", "need EI", EI, "give EI: a rest curvature acts through bending")

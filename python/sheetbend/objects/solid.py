@@ -11,7 +11,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import check_kind, check_label, check_positive, finite, is_number, some_indices
+from ..arrays.checks import check_kind, check_label, check_positive, finite, is_list, is_number, some_indices
 from ..errors import SceneError
 from ..mesh import SolidMesh, TriangleMesh
 from ..quantities.quantities import Term
@@ -216,12 +216,12 @@ def _checked_numbers(
     rubber = law == "neo_hookean"
     check_positive(name, {"density": density}, {"damping": damping})
     others = {"poisson": poisson, "law": law if rubber else None, "volume_row": volume_row or None}
-    if clusters is not None and not isinstance(clusters, Sequence):
+    if clusters is not None and not is_list(clusters):
         raise SceneError(f"{name}.clusters", "must be a list", clusters, "give lists of vertices")
     if orthotropic is not None:
         fix = "give sb.Orthotropic(E, G, poisson, axes)"
         check_kind(f"{name}.orthotropic", orthotropic, Orthotropic, fix, SceneError)
-        _refuse_beside(name, "orthotropic", {"E": E, "clusters": clusters and len(clusters), **others})
+        _refuse_beside(name, "orthotropic", {"E": E, "clusters": None if clusters is None else len(clusters), **others})
         return {"density": density, "orthotropic": orthotropic, "damping": damping}
     if clusters is not None:
         _refuse_beside(name, "clusters", others)

@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from ..arrays.checks import is_bound, is_number
+from ..arrays.checks import is_bound, is_number, is_several
 from ..arrays.timeseries import Array
 from ..errors import InputError
 
@@ -151,7 +151,7 @@ class Parameters(Mapping[str, Parameter]):
 
     def __init__(self, parameters: Iterable[Parameter]) -> None:
         self._parameters: dict[str, Parameter] = {}
-        if isinstance(parameters, str) or not isinstance(parameters, Iterable):
+        if not is_several(parameters):
             raise InputError("parameters", "must be a list", parameters, "give [sb.Parameter(name=...)]")
         for parameter in parameters:
             if not isinstance(parameter, Parameter):

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays.checks import check_kind
+from ..arrays.checks import check_kind, is_several
 from ..arrays.timeseries import Array, mean_position
 from ..errors import RecordingError
 from .cloud import Cloud
@@ -82,9 +82,10 @@ def rest_baseline(fitted: Recording | Sequence[Recording]) -> Array:
     Raises:
         RecordingError: the recordings have different markers, or there is none.
     """
-    recordings = [fitted] if isinstance(fitted, Recording) else list(fitted) if isinstance(fitted, Sequence) else []
+    recordings = [fitted] if isinstance(fitted, Recording) else list(fitted) if is_several(fitted) else []
     if not recordings or not all(isinstance(r, Recording) for r in recordings):
-        raise RecordingError("fitted", "must hold at least one recording", 0, "give what was fitted")
+        got = fitted if recordings or not is_several(fitted) else 0
+        raise RecordingError("fitted", "must be a recording, or at least one in a list", got, "give what was fitted")
     for other in recordings[1:]:
         _check_same_markers(recordings[0], other)
     return mean_position(np.concatenate([recording.positions for recording in recordings]))

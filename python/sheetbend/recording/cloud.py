@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import check_count, finite, is_number
+from ..arrays.checks import check_count, finite, is_list, is_number
 from ..arrays.timeseries import Array
 from ..errors import RecordingError
 from ..files.names import checked_name
@@ -65,7 +65,7 @@ class Cloud(Recording):
         Raises:
             RecordingError: names the frame whose points are not finite or have another shape.
         """
-        if not isinstance(points, Sequence | np.ndarray):
+        if not is_list(points):
             raise RecordingError("points", "must be a list", points, "give the points (n, 3) m of each frame")
         at = checked_times(times, len(points))
         return cls(padded([_checked(k, frame) for k, frame in enumerate(points)]), at, **fields)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import timeseries
-from ..arrays.checks import MOST, is_bound, is_number, numbers
+from ..arrays.checks import MOST, is_bound, is_list, is_number, numbers
 from ..arrays.timeseries import Array, Kind
 from ..errors import RecordingError
 from . import io
@@ -163,7 +163,7 @@ class Recording(MarkerData):
         Raises:
             RecordingError: a span is no pair, holds no frame, or nothing is seen outside of them.
         """
-        if not isinstance(spans, Sequence | np.ndarray):
+        if not is_list(spans):
             raise RecordingError("spans", "must be a list", spans, "give [(start, stop)] in s")
         inside = np.zeros(len(self.times), dtype=bool)
         for i, span in enumerate(spans):

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays.checks import is_several
 from ..arrays.timeseries import Array
 from ..errors import RecordingError
 
@@ -20,7 +21,7 @@ def marker_indices(what: str, chosen: Iterable[str | int], markers: tuple[str, .
     Raises:
         RecordingError: a name is unknown, an index is no integer or out of range, or a marker comes twice.
     """
-    if isinstance(chosen, str) or not isinstance(chosen, Iterable):
+    if not is_several(chosen):
         raise RecordingError(what, "must be a list of markers", chosen, f"write [{chosen!r}]")
     number = {name: i for i, name in enumerate(markers)}
     indices: dict[int, None] = {}
@@ -153,7 +154,7 @@ def checked_times(values: ArrayLike, frames: int | None) -> Array:
 
 
 def checked_markers(names: Iterable[str], count: int, letter: str = "m") -> tuple[str, ...]:
-    if isinstance(names, str) or not isinstance(names, Iterable):
+    if not is_several(names):
         raise RecordingError("markers", "must be a list of names", names, f"give {count} names")
     names = tuple(names) or default_markers(count, letter)
     if len(names) != count:

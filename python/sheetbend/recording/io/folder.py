@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from ...errors import RecordingError
 from ..recording import Recording
-from . import ELSEWHERE, FORMATS
+from . import ELSEWHERE, FORMATS, sidecar, told_unit
 from .natural import by_number
 
 NOTES = ".txt"
@@ -36,8 +36,9 @@ def read_recordings(
         pattern: which files, as for `Path.glob`; "*/*" looks one folder below. Files that end in .txt are read only if
             the pattern also ends in .txt.
         units: length unit of the files, as for `Recording.load`.
-        refused: if given, a file that cannot be read does not stop the others. The errors are stored here by file
-            name, also those of other kinds of files that laboratories use (`ELSEWHERE`), such as .mat.
+        refused: if given, a file that cannot be read does not stop the others. The errors are stored here by the path
+            of the file in the folder, such as "monday/00.pkl", also those of other kinds of files that laboratories use
+            (`ELSEWHERE`), such as .mat.
 
     Returns:
         The recordings, as `Recording.load` reads them. If files in several folders have the same name, the name of the
@@ -52,9 +53,9 @@ def read_recordings(
         raise RecordingError("pattern", "is no pattern of names", pattern, "give such as '*.csv'")
     if not isinstance(refused, dict | None):
         raise RecordingError("refused", "must be a dict", refused, "give an empty one")
-    known = [suffix for suffix in FORMATS if suffix != NOTES or pattern.lower().endswith(NOTES)]
+    known = _known(pattern)
     files, others = _files(root, pattern, known)
-    errors = {file.name: _of_another_kind(file) for file in others}
+    errors = {_within(root, file): _of_another_kind(file) for file in others}
     if refused is not None:
         refused.update(errors)
     if not files and errors:
@@ -74,7 +75,7 @@ def read_recordings(
         except RecordingError as error:
             if refused is None:
                 raise
-            refused[file.name] = error
+            refused[_within(root, file)] = error
             continue
         if below:
             said = f"is read from {file.parent.relative_to(root)}, below the folder that is given"
@@ -111,6 +112,28 @@ def _files(root: Path, pattern: str, known: Sequence[str]) -> tuple[list[Path], 
         if (files or others) and (own == pattern or len({p.parent for p in matching}) == 1):
             return files, others
     return [], []
+
+
+def units_told(folder: str | Path, pattern: str, refused: Container[str]) -> bool:
+    """Whether every file that `read_recordings` reads there, or a JSON beside it, tells its length unit. That of .npz,
+    which is m unless a JSON says another, is not told by the file: anybody may have written it.
+
+    Args:
+        refused: files that do not count, as `read_recordings` names them.
+    """
+    root = Path(folder)
+    files = (f for f in _files(root, pattern, _known(pattern))[0] if _within(root, f) not in refused)
+    return all((sidecar.beside(f).get("units") if f.suffix.lower() == ".npz" else told_unit(f)) for f in files)
+
+
+def _known(pattern: str) -> list[str]:
+    """Suffixes of recordings."""
+    return [suffix for suffix in FORMATS if suffix != NOTES or pattern.lower().endswith(NOTES)]
+
+
+def _within(root: Path, file: Path) -> str:
+    """The path of a file in a folder, which may be the file itself."""
+    return file.name if file == root else file.relative_to(root).as_posix()
 
 
 def _of_another_kind(file: Path) -> RecordingError:

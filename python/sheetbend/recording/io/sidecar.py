@@ -116,8 +116,21 @@ def beside(path: Path) -> dict[str, Any]:
         RecordingError: one of them is malformed.
     """
     folder = path.absolute().parent
-    of_all = _said(folder.with_name(f"{folder.name}.json")) if folder.name else {}
+    of_all = _of_folder(folder) if folder.name else {}
     return {key: of_all[key] for key in _OF_A_FOLDER if key in of_all} | _said(path.with_suffix(".json"))
+
+
+def _of_folder(folder: Path) -> dict[str, Any]:
+    """What the JSON beside a folder says.
+
+    Raises:
+        RecordingError: it is malformed; the message names the folder, since the JSON may be meant for something else.
+    """
+    try:
+        return _said(folder.with_name(f"{folder.name}.json"))
+    except RecordingError as error:
+        problem = f"is read as the JSON of the folder {folder.name} and {error.problem}"
+        raise RecordingError(error.field, problem, error.got, error.fix) from error
 
 
 def _said(path: Path) -> dict[str, Any]:
@@ -126,7 +139,7 @@ def _said(path: Path) -> dict[str, Any]:
         return {}
     content = json_content(path, RecordingError)
     if not isinstance(content, dict):
-        fix = 'write {"units": "m", ...}'
+        fix = 'write {"units": "m", ...}, or move it away'
         raise RecordingError(str(path), "must be a JSON object", type(content).__name__, fix)
     return content
 
