@@ -12,10 +12,10 @@ from itertools import permutations
 
 import numpy as np
 
+from ..arrays.shortest_tree import tree
 from ..arrays.timeseries import Array, mean_position
 from ..errors import RecordingError
 from ..files.units import METERS
-from ..optional import require
 from ..recording.recording import Recording
 from ..recording.relabeled import put_back
 from ..recording.unit_doubt import LONGEST, unit_doubt
@@ -91,14 +91,13 @@ def _shortest_line(distance: Array) -> np.ndarray | None:
     """The order in which the shortest tree joins markers, if it is a line, from the end whose number is lower."""
     if len(distance) < 2 or not np.isfinite(distance).all():
         return None
-    tree = require("scipy.sparse.csgraph", "fit").minimum_spanning_tree(distance).toarray() > 0.0
-    joined = tree | tree.T
-    ends = np.flatnonzero(joined.sum(axis=1) == 1)
-    if len(ends) != 2 or joined.sum() != 2 * (len(distance) - 1):
+    beside, _ = tree(distance, tuple(range(len(distance))))
+    ends = sorted(k for k, others in beside.items() if len(others) == 1)
+    if len(ends) != 2:
         return None
-    order = [int(ends[0])]
+    order = ends[:1]
     while len(order) < len(distance):
-        order.append(next(k for k in np.flatnonzero(joined[order[-1]]).tolist() if k not in order[-2:]))
+        order.append(next(k for k in beside[order[-1]] if k not in order[-2:]))
     return np.array(order)
 
 

@@ -6,6 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..arrays.shortest_tree import tree
+
 Array = np.ndarray
 SHORTER = 0.9  # of the length through the markers in the file's order: another order counts only if it is so short
 GAP = 2.5  # times every other distance of neighbors: two ropes, or a rope with a long part that no marker shows
@@ -29,22 +31,6 @@ def chain(apart: Array, markers: tuple[int, ...]) -> tuple[int, ...]:
         if length(tuple(order)) < SHORTER * length(best):
             best = tuple(order)
     return best
-
-
-def tree(apart: Array, markers: tuple[int, ...]) -> tuple[dict[int, set[int]], float]:
-    """The shortest tree through markers, as the neighbors of each, and its length (Prim 1957, Bell Syst. Tech. J. 36,
-    1389)."""
-    found: dict[int, set[int]] = {markers[0]: set()}
-    nearest = {k: (float(apart[markers[0], k]), markers[0]) for k in markers[1:]}
-    total = 0.0
-    while nearest:
-        b = min(nearest, key=lambda k: nearest[k])
-        distance, a = nearest.pop(b)
-        found[a].add(b)
-        found[b] = {a}
-        total += distance
-        nearest = {k: min(near, (float(apart[b, k]), b)) for k, near in nearest.items()}
-    return found, total
 
 
 def forks(apart: Array, order: tuple[int, ...]) -> tuple[list[int], float]:

@@ -8,11 +8,12 @@ from typing import Literal
 
 import numpy as np
 
+from ..arrays.shortest_tree import tree
 from ..arrays.smoothing import smoothed
 from ..arrays.timeseries import default_max_gap, interpolate, mean_position
 from ..errors import RecordingError
 from ..recording.recording import Recording
-from .line import chain, tree
+from .line import chain
 
 Array = np.ndarray
 EARTH = 9.81
