@@ -86,6 +86,12 @@ def _particles() -> sb.Scene:
     return scene
 
 
+def _touching(**arguments: Any) -> Call:
+    return _with(
+        _particles(), "add_contact", what=[0, 1], collider=sb.Plane(point=(0, 0, -1)), friction=0.3, **arguments
+    )
+
+
 def _air(scene: sb.Scene) -> dict[str, Any]:
     (cloth,) = scene.cloths.values()
     return {"triangles": cloth.particles[cloth.mesh.triangles]}
@@ -169,29 +175,11 @@ SCENE: dict[str, Callable[[], Call]] = {
     "Scene.add_volume": lambda: _with(
         _balloon(), "add_volume", triangles=sb.mesh.icosphere(0.1, 0).triangles, compliance=1e-3, rest=1e-3, name="v"
     ),
-    "Scene.contact": lambda: _with(
-        _particles(),
-        "contact",
-        what=[0, 1],
-        collider=sb.Plane(point=(0, 0, -1)),
-        friction=0.3,
-        radius=0.01,
-        stiffness=1e3,
-        restitution=0.1,
-        name="c",
-    ),
-    "Scene.contact soft": lambda: _with(
-        _particles(),
-        "contact",
-        what=[0, 1],
-        collider=sb.Plane(point=(0, 0, -1)),
-        friction=0.3,
-        stiffness=1e3,
-        dissipation=0.1,
-    ),
-    "Scene.contact of a body": lambda: (
+    "Scene.add_contact": lambda: _touching(radius=0.01, stiffness=1e3, restitution=0.1, name="c"),
+    "Scene.add_contact soft": lambda: _touching(stiffness=1e3, dissipation=0.1),
+    "Scene.add_contact of a body": lambda: (
         lambda s, b: _with(
-            s, "contact", what=b, collider=sb.Plane(), friction=0.3, points=sb.box_corners((0.1, 0.1, 0.1))
+            s, "add_contact", what=b, collider=sb.Plane(), friction=0.3, points=sb.box_corners((0.1, 0.1, 0.1))
         )
     )(*bodies()),
     "Scene.pin": lambda: _with(_particles(), "pin", particles=[0]),
@@ -199,7 +187,9 @@ SCENE: dict[str, Callable[[], Call]] = {
     "Scene.add_quantity": lambda: _with(
         sb.Scene(), "add_quantity", name="q", value=1.0, unit="m", positive=True, scale=1.0, limits=(0.0, 2.0)
     ),
-    "Scene.self_contact": lambda: (lambda s, c: _with(s, "self_contact", friction=0.3, radius=1e-3))(*clothed()),
+    "Scene.add_self_contact": lambda: (lambda s, c: _with(s, "add_self_contact", friction=0.3, radius=1e-3))(
+        *clothed()
+    ),
     "Scene.group": lambda: _with(rope(), "group", name="rope_bend"),
     "Body.point": lambda: (bodies()[1].point, {"at": (0, 0, 0.1), "along": (1, 0, 0), "name": "p"}),
     "Body.capsules": lambda: (bodies()[1].capsules, {"ends": [((0, 0, 0), (1, 0, 0))]}),

@@ -121,7 +121,9 @@ class Equilibrium:
         lambda_bar = np.zeros(len(self.solution.multipliers))
         forces, pressures = forces_by_group(self.scene, lambda_bar), pressures_by_volume(self.scene, lambda_bar)
         for argument, bars in (("forces_bar", forces_bar), ("pressures_bar", pressures_bar)):
-            check_kind(argument, {} if bars is None else bars, Mapping, "give derivatives by name", SceneError)
+            check_kind(
+                argument, {} if bars is None else bars, Mapping, "give a mapping from names to arrays", SceneError
+            )
         for name, bar in (forces_bar or {}).items():
             self.scene.group(name)
             forces[name][...] = finite(f"forces_bar.{name}", bar, forces[name].shape, SceneError)
