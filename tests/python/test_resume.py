@@ -13,6 +13,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import ModuleType
@@ -23,6 +24,7 @@ import pytest
 import sheetbend as sb
 from commands import last_line, run
 from sheetbend import cli
+from sheetbend.cli.stopping import Stopping
 from sheetbend.minimum import by_ceres
 from sheetbend.minimum.by_ceres import has_ceres
 from sheetbend.minimum.journal import Journal
@@ -212,10 +214,42 @@ class TestStopping:
         assert found["interrupted"] and sb.FitResult.load(OUT / "fit.json").interrupted
         assert (OUT / "journal.sqlite").exists() and not (OUT / ".running").exists()
 
-    def test_the_handler_of_before_comes_back(self, config: Path) -> None:
-        before = signal.getsignal(signal.SIGTERM)
+    def test_what_stood_before_comes_back(self, config: Path) -> None:
+        before = signal.getsignal(signal.SIGTERM), sys.unraisablehook
         run("fit", config)
-        assert signal.getsignal(signal.SIGTERM) == before
+        assert (signal.getsignal(signal.SIGTERM), sys.unraisablehook) == before
+
+    @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+    def test_an_interrupt_that_comes_in_a_destructor_is_not_lost(self, number: signal.Signals) -> None:
+        class Last:
+            def __del__(self) -> None:
+                signal.raise_signal(number)
+                gone.append("the destructor went on")
+
+        def work(stopping: Stopping) -> None:
+            last = Last()
+            with stopping:
+                del last
+                gone.append("Python went on")
+                time.sleep(60)
+
+        gone: list[str] = []
+        stopping = Stopping()
+        with pytest.raises(KeyboardInterrupt):
+            work(stopping)
+        assert gone == ["Python went on"] and stopping.terminated == (number == signal.SIGTERM)
+
+    def test_other_exceptions_of_a_destructor_go_where_they_went(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        class Last:
+            def __del__(self) -> None:
+                raise ValueError("in a destructor")
+
+        seen: list[object] = []
+        monkeypatch.setattr(sys, "unraisablehook", lambda what: seen.append(what.exc_value))
+        last = Last()
+        with Stopping():
+            del last
+        assert [str(error) for error in seen] == ["in a destructor"]
 
 
 class TestFolder:
