@@ -8,6 +8,7 @@ from .pictures.estimate_plot import plot_estimates as estimates
 from .pictures.field_plot import Field
 from .pictures.field_plot import plot_fields as fields
 from .pictures.force_plot import plot_forces as forces
+from .pictures.over_time_plot import plot_over_time as over_time
 from .pictures.plotting import Motion, compared, save
 from .pictures.plotting import plot_motions as motions
 from .pictures.plotting import plot_residuals as residuals
@@ -25,6 +26,7 @@ __all__ = [
     "green_strain",
     "largest_strain",
     "motions",
+    "over_time",
     "residuals",
     "save",
     "shapes",

@@ -55,6 +55,11 @@ class StiffnessField:
         return self.modes[0].removesuffix("_1")
 
     @property
+    def scale(self) -> float:
+        """An order of magnitude of its deviations, in ln E."""
+        return 1.0
+
+    @property
     def extent(self) -> float:
         """Of the centers, m."""
         return float(np.linalg.norm(np.ptp(self.centers, axis=0)))
@@ -132,7 +137,7 @@ def modes_of_triangles(corners: Array, triangles: NDArray[np.intp]) -> tuple[Arr
     """
     _, places, laplacian, area = laplacian_of_triangles(corners, triangles)
     values, shapes = modes_of_laplacian(laplacian, area, float(area.sum()))
-    return values, _signed(shapes)[places].mean(axis=1)
+    return values, signed(shapes)[places].mean(axis=1)
 
 
 def modes_of_laplacian(laplacian: Array, sizes: Array, whole: float) -> tuple[Array, Array]:
@@ -183,10 +188,10 @@ def modes_of(centers: Array, neighbors: NDArray[np.intp]) -> tuple[Array, Array]
     laplacian += laplacian.T
     laplacian -= np.diag(laplacian.sum(axis=1))
     values, vectors = np.linalg.eigh(laplacian)
-    return np.maximum(values, 0.0), _signed(vectors) * np.sqrt(n)
+    return np.maximum(values, 0.0), signed(vectors) * np.sqrt(n)
 
 
-def _signed(vectors: Array) -> Array:
+def signed(vectors: Array) -> Array:
     """With the largest entry of each column positive."""
     strongest = vectors[np.argmax(np.abs(vectors), axis=0), np.arange(vectors.shape[1])]
     return np.asarray(vectors * np.sign(strongest))

@@ -40,14 +40,15 @@ def _row(f: FieldFit) -> tuple[str, ...]:
         short(max(f.stiffness), 3),
         f.unit,
         short(f.size, 2),
-        _interval(f.size_lower, f.size_upper, 1.0),
+        interval(f.size_lower, f.size_upper, 1.0),
         short(1e3 * f.length, 2),
-        _interval(f.length_lower, f.length_upper, 1e3),
+        interval(f.length_lower, f.length_upper, 1e3),
         "mm",
     )
 
 
-def _interval(lower: float | None, upper: float | None, factor: float) -> str:
+def interval(lower: float | None, upper: float | None, factor: float) -> str:
+    """The ends of what was found, in words."""
     if lower is None:
         return "given"
     if upper is None:
