@@ -4,6 +4,7 @@ Every function takes `ax`, axes to draw in, and returns the axes that it has dra
 that belongs to no window; `save` writes it, and a notebook shows `axes.figure`.
 """
 
+from .pictures.along_plot import plot_along as along
 from .pictures.estimate_plot import plot_estimates as estimates
 from .pictures.field_plot import Field
 from .pictures.field_plot import plot_fields as fields
@@ -19,6 +20,7 @@ from .pictures.strain import green_strain, largest_strain, strain_fields
 __all__ = [
     "Field",
     "Motion",
+    "along",
     "compared",
     "estimates",
     "fields",

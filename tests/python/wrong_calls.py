@@ -285,7 +285,15 @@ OBJECTS: dict[str, Callable[[], Call]] = {
     ),
     "rope with modes": lambda: (
         sb.rope,
-        {"length": 0.3, "segments": 8, "density": 0.05, "EI": 1e-3, "plane": (0, 1, 0), "set_modes": (1, 2)},
+        {
+            "length": 0.3,
+            "segments": 8,
+            "density": 0.05,
+            "EI": 1e-3,
+            "plane": (0, 1, 0),
+            "set_modes": (1, 2),
+            "softness_modes": (1,),
+        },
     ),
     "add_rope": lambda: (
         sb.add_rope,

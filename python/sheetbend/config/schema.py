@@ -241,8 +241,9 @@ class GivenSection(Section):
 
 class SmoothSection(Section):
     """A field that is fitted with a smoothness prior. One table each: [smooth.NAME], NAME being "<solid>_stiffness" of
-    a solid with clusters and `stiffness_modes`, "<cloth>_stiffness" of a cloth with them, or the name of an unknown
-    force or wind, which needs no table. The modes are then parameters."""
+    a solid with clusters and `stiffness_modes`, "<cloth>_stiffness" of a cloth with them, "<rope>_softness" of a rope
+    or rod with `softness_modes`, or the name of an unknown force or wind, which needs no table. The modes are then
+    parameters."""
 
     size: Finite | None = key(
         None,

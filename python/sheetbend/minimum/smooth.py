@@ -117,7 +117,8 @@ def with_fields(
         InputError: no scene has such a field, a mode is a parameter already, a size or length is not positive, or an
             input over time does not suit a recording.
     """
-    objects = [o for e in experiments for o in (*e.scene.solids.values(), *e.scene.cloths.values())]
+    scenes = [e.scene for e in experiments]
+    objects = [o for s in scenes for o in (*s.solids.values(), *s.cloths.values(), *s.ropes.values())]
     known: dict[str, Modes] = {o.field.name: o.field for o in objects if o.field is not None}
     over_time = inputs_over_time(experiments)
     known |= {name: next(iter(own.values())) for name, own in over_time.items()}
@@ -126,7 +127,8 @@ def with_fields(
     for name, wanted in ({name: Smooth() for name in over_time} | dict(smooth)).items():
         check_kind(f"smooth.{name}", wanted, Smooth, "give sb.Smooth()")
         if name not in known:
-            fix = f"name one of: {', '.join(known) or 'none, give a cloth or a solid of clusters stiffness_modes'}"
+            none = "none, give a cloth or a solid of clusters stiffness_modes, or a rope softness_modes from 1 on"
+            fix = f"name one of: {', '.join(known) or none}"
             raise InputError(f"smooth.{name}", "names no field of the scenes", name, fix)
         private = len(over_time.get(name, ())) > 1
         own = over_time[name] if private else {}

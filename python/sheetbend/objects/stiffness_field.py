@@ -1,11 +1,11 @@
 """A stiffness that varies smoothly from place to place, as the logarithm of a mean one and smooth modes.
 
-Places are the clusters of a solid or the triangles of a cloth. ln E of place c is ln E + sum_k shapes[c, k] q_k, with
-one quantity q_k for each mode. The modes are eigenvectors of the Laplace operator, that of the graph of clusters or in
-finite elements on the mesh of a cloth: the first bends least from place to place, the next more. Their eigenvalues are
-squared wave numbers (1/m^2), so a prior of a given length is one of independent modes, whose deviations fall as
-1/(1 + length^2 eigenvalue): a field of Matern's class (Whittle 1954, Biometrika 41; Lindgren, Rue & Lindstrom 2011, J.
-R. Stat. Soc. B 73).
+Places are the clusters of a solid, the triangles of a cloth or the joints of a rope (`along_rope`). ln E of place c is
+ln E + sum_k shapes[c, k] q_k, with one quantity q_k for each mode. The modes are eigenvectors of the Laplace operator,
+that of the graph of clusters or in finite elements on the mesh of a cloth: the first bends least from place to place,
+the next more. Their eigenvalues are squared wave numbers (1/m^2), so a prior of a given length is one of independent
+modes, whose deviations fall as 1/(1 + length^2 eigenvalue): a field of Matern's class (Whittle 1954, Biometrika 41;
+Lindgren, Rue & Lindstrom 2011, J. R. Stat. Soc. B 73).
 """
 
 from __future__ import annotations
@@ -34,10 +34,11 @@ class StiffnessField:
         modes: names of the quantities of the modes, smoothest first.
         eigenvalues: (places,) 1/m^2, ascending, of all modes; the first is that of the constant.
         shapes: (places, modes), of mean square 1: a quantity is the root mean square of what it adds to ln E.
-        centers: (places, 3) m, at rest.
+        centers: (places, 3) m, at rest; along a rope its arc length, 0 and 0.
         finer: (places, others) likewise, of the modes that have no quantity.
         unit: of the stiffness.
         place: what one place is called.
+        rms: root mean square of the shapes where it is not 1.
     """
 
     stiffness: str
@@ -48,6 +49,7 @@ class StiffnessField:
     finer: Array
     unit: str = "Pa"
     place: str = "cluster"
+    rms: float = 1.0
 
     @property
     def name(self) -> str:
@@ -74,7 +76,7 @@ class StiffnessField:
         return np.asarray(np.sum((self.finer * self._of_all(size, length)[len(self.modes) :]) ** 2, axis=1))
 
     def _of_all(self, size: float, length: float) -> Array:
-        return np.asarray(size * shares(self.eigenvalues[1:], length))
+        return np.asarray(size / self.rms * shares(self.eigenvalues[1:], length))
 
 
 def shares(eigenvalues: Array, length: float) -> Array:
