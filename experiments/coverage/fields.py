@@ -1,11 +1,13 @@
-"""How often 95 % intervals of 392 triangle stiffnesses hold the truth, and how they depend on the modes and the motion.
+"""How often 95 % intervals of a stiffness that varies from place to place hold the truth, and how they depend on the
+modes and the motion: of 392 triangles of a cloth, or of 20 joints of a rope.
 
     python experiments/coverage/fields.py draw short --seeds 0 20   # one JSON line per seed; known ones are skipped
     python experiments/coverage/fields.py table
     python experiments/coverage/fields.py figure short 0            # one draw as a map: what is left beside the error
 
-A square cloth of 14 x 14 cells is let go at the level of its pins. ln E is drawn from the prior with all modes that the
-mesh has; the fit has some of them, and finds the size and the length of the prior.
+A square cloth of 14 x 14 cells is let go at the level of its pins, or a rope of 20 links that is clamped at one end.
+ln E is drawn from the prior with all modes that the mesh has; the fit has some of them, and finds the size and the
+length of the prior.
 """
 
 from __future__ import annotations
@@ -23,22 +25,19 @@ from scipy.stats import binomtest
 from sheetbend.cli.cloth_figures import stiffness_panels
 from sheetbend.minimum.counts import counted
 
-SIDE, CELLS, WARP = 0.3, 14, 20.0
+SIDE, CELLS, WARP, EI, JOINTS = 0.3, 14, 20.0, 1e-3, 20
 SIZE, LENGTH = 0.3, 0.1  # of the prior that fields are drawn from
-NOISE = 1e-3
-SOLVER = sb.Solver(h=0.01, method="newton")
-ALL = (CELLS + 1) ** 2 - 1  # modes of the mesh
 AFTER_NEWTON = {"refine": False, "profiles": False, "beginnings": False, "windows": ()}
 
 
 @dataclass(frozen=True)
 class Motion:
-    """A cloth that falls.
+    """A cloth or a rope that falls.
 
     Attributes:
         about: in words.
-        pinned: vertices.
-        frames: at 50 Hz.
+        pinned: vertices of a cloth; none of a rope.
+        frames: at 50 Hz, of a rope at 60 Hz.
         modes: that are fitted.
     """
 
@@ -47,6 +46,24 @@ class Motion:
     frames: int
     modes: int
 
+    @property
+    def is_rope(self) -> bool:
+        return not self.pinned
+
+    @property
+    def every(self) -> int:
+        """Modes of the mesh."""
+        return JOINTS - 1 if self.is_rope else (CELLS + 1) ** 2 - 1
+
+    @property
+    def noise(self) -> float:
+        return 5e-4 if self.is_rope else 1e-3
+
+    @property
+    def mean(self) -> tuple[str, float]:
+        """The quantity of the mean stiffness, and its true value."""
+        return ("rope_EI", EI) if self.is_rope else ("cloth_warp", WARP)
+
 
 CORNERS, EDGE = (0, CELLS), tuple(range(CELLS + 1))
 MOTIONS = {
@@ -54,10 +71,14 @@ MOTIONS = {
     "edge": Motion("from an edge, 0.48 s", EDGE, 25, 60),
     "few": Motion("from two corners, 0.48 s", CORNERS, 25, 20),
     "long": Motion("from two corners, 0.48 s", CORNERS, 25, 60),
+    "rope": Motion("a rope from a clamp, 1 s", (), 61, 12),
 }
 
 
 def hung(motion: Motion, modes: int) -> sb.Scene:
+    if motion.is_rope:
+        own = {"density": 0.05, "EI": EI, "bend_damping": 0.02, "drag_linear": 0.02, "clamp_start": (1.0, 0.0, 0.0)}
+        return sb.rope(0.4, JOINTS, pinned=(), softness_modes=range(1, modes + 1), **own)
     mesh = sb.mesh.grid(SIDE, SIDE, CELLS, CELLS, pattern="one_way")
     given = {"density": 0.2, "warp": WARP, "shear": 8.0, "bending": 1e-4, "membrane_damping": 0.01}
     return sb.cloth(mesh, pinned=motion.pinned, stiffness_modes=modes, **given)
@@ -66,23 +87,24 @@ def hung(motion: Motion, modes: int) -> sb.Scene:
 def fitted(motion: Motion, seed: int) -> tuple[sb.Fit, np.ndarray]:
     """A fit to a field drawn from the prior, and the true ln E (triangles,)."""
     rng = np.random.default_rng(seed)
-    scene = hung(motion, ALL)
-    field = scene.cloths["cloth"].field
-    q = field.deviations(SIZE, LENGTH) * rng.standard_normal(ALL)
-    times = np.arange(motion.frames) / 50
-    x = sb.simulate(scene, times, SOLVER, values=dict(zip(field.modes, q, strict=True))).positions
-    recording = sb.Recording(x + NOISE * rng.standard_normal(x.shape), times, name="fall")
+    scene = hung(motion, motion.every)
+    field = scene.ropes["rope"].field if motion.is_rope else scene.cloths["cloth"].field
+    q = field.deviations(SIZE, LENGTH) * rng.standard_normal(motion.every)
+    times = np.arange(motion.frames) / (60 if motion.is_rope else 50)
+    solver = sb.Solver(h=1 / 600) if motion.is_rope else sb.Solver(h=0.01, method="newton")
+    x = sb.simulate(scene, times, solver, values=dict(zip(field.modes, q, strict=True))).positions
+    recording = sb.Recording(x + motion.noise * rng.standard_normal(x.shape), times, name="fall")
     found = sb.fit(
         hung(motion, motion.modes),
         recording,
-        ["cloth_warp"],
+        [motion.mean[0]],
         markers=[sb.on_particle(i) for i in range(x.shape[1])],
-        solver=SOLVER,
-        sigma=NOISE,
-        smooth={"cloth_stiffness": sb.Smooth()},
+        solver=solver,
+        sigma=motion.noise,
+        smooth={field.name: sb.Smooth()},
         **AFTER_NEWTON,
     )
-    return found, np.log(WARP) + field.shapes @ q
+    return found, np.log(motion.mean[1]) + field.shapes @ q
 
 
 def draw(name: str, seeds: range, folder: Path) -> None:
@@ -109,7 +131,8 @@ def draw(name: str, seeds: range, folder: Path) -> None:
                 "left": float(np.mean(field.left)),
                 "size": [field.size_lower, field.size, field.size_upper],
                 "length": [field.length_lower, field.length, field.length_upper],
-                "verdict": found["cloth_warp"].verdict,
+                "verdict": found[MOTIONS[name].mean[0]].verdict,
+                "mean": [found[MOTIONS[name].mean[0]].lower, found[MOTIONS[name].mean[0]].upper],
             }
             file.write(json.dumps(entry) + "\n")
             file.flush()

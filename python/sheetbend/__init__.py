@@ -54,6 +54,7 @@ from .objects.joint_making import Joint, ground
 from .objects.joints import ball, cylinder, fixed, hinge, slider, universal
 from .objects.locking import LockingWarning
 from .objects.markers import Place, along_rope, between, on_body, on_cloth, on_particle, on_rope, on_solid
+from .objects.over_time import OverTime, add_unknown_force, add_unknown_wind
 from .objects.rod import Rod, add_rod, rod
 from .objects.rod_junction import Junction
 from .objects.rope import Rope, add_rope, rope
@@ -134,6 +135,7 @@ __all__ = [
     "MeshError",
     "NoEquilibriumError",
     "Orthotropic",
+    "OverTime",
     "Parameter",
     "Parameters",
     "Place",
@@ -170,6 +172,8 @@ __all__ = [
     "add_rope",
     "add_solid",
     "add_tethers",
+    "add_unknown_force",
+    "add_unknown_wind",
     "along_rope",
     "ball",
     "baseline",

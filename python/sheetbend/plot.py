@@ -4,10 +4,12 @@ Every function takes `ax`, axes to draw in, and returns the axes that it has dra
 that belongs to no window; `save` writes it, and a notebook shows `axes.figure`.
 """
 
+from .pictures.along_plot import plot_along as along
 from .pictures.estimate_plot import plot_estimates as estimates
 from .pictures.field_plot import Field
 from .pictures.field_plot import plot_fields as fields
 from .pictures.force_plot import plot_forces as forces
+from .pictures.over_time_plot import plot_over_time as over_time
 from .pictures.plotting import Motion, compared, save
 from .pictures.plotting import plot_motions as motions
 from .pictures.plotting import plot_residuals as residuals
@@ -18,6 +20,7 @@ from .pictures.strain import green_strain, largest_strain, strain_fields
 __all__ = [
     "Field",
     "Motion",
+    "along",
     "compared",
     "estimates",
     "fields",
@@ -25,6 +28,7 @@ __all__ = [
     "green_strain",
     "largest_strain",
     "motions",
+    "over_time",
     "residuals",
     "save",
     "shapes",

@@ -65,6 +65,8 @@ WHOLE: dict[str, Any] = {
         "constraints": [{"kind": "distance", "particles": [["a", "rope:0"]]}],
         "point_mass": [{"name": "p", "particle": "a", "mass": 1.0}],
         "force": [{"particles": ["a"], "force": [0, 0, 1]}],
+        "unknown_force": [{"particles": ["a"], "scale": 0.1, "spacing": 0.1}],
+        "unknown_wind": {"scale": 1.0, "spacing": 0.1},
         "wind": {"velocity": [1, 0, 0]},
         "tool": [{"name": "t"}],
         "drive": [{"particles": ["a"], "markers": ["m0"]}],

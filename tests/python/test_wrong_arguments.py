@@ -108,6 +108,7 @@ def test_every_public_function_is_called() -> None:
             "GradientReport",
             "Joint",
             "ManyFit",
+            "OverTime",
             "Place",
             "Plan",
             "Rod",

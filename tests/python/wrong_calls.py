@@ -285,7 +285,15 @@ OBJECTS: dict[str, Callable[[], Call]] = {
     ),
     "rope with modes": lambda: (
         sb.rope,
-        {"length": 0.3, "segments": 8, "density": 0.05, "EI": 1e-3, "plane": (0, 1, 0), "set_modes": (1, 2)},
+        {
+            "length": 0.3,
+            "segments": 8,
+            "density": 0.05,
+            "EI": 1e-3,
+            "plane": (0, 1, 0),
+            "set_modes": (1, 2),
+            "softness_modes": (1,),
+        },
     ),
     "add_rope": lambda: (
         sb.add_rope,
@@ -436,6 +444,14 @@ OBJECTS: dict[str, Callable[[], Call]] = {
     "add_tethers": lambda: (
         lambda s, c: (sb.add_tethers, {"scene": s, "cloth": c, "anchors": [0], "stretch": 0.1, "compliance": 1e-3})
     )(*clothed()),
+    "add_unknown_force": lambda: (
+        sb.add_unknown_force,
+        {"scene": rope(), "particles": [2], "scale": 0.1, "spacing": 0.1, "duration": 0.2, "name": "push"},
+    ),
+    "add_unknown_wind": lambda: (
+        sb.add_unknown_wind,
+        {"scene": clothed()[0], "scale": 0.1, "spacing": 0.1, "duration": 0.2, "name": "gust"},
+    ),
     "add_arm": lambda: (
         sb.add_arm,
         {

@@ -16,8 +16,10 @@ from ..fitting.fit import Fit
 from ..motion.equilibrium import equilibrium
 from ..optional import require
 from ..pictures import plotting
+from ..pictures.along_plot import plot_along
 from ..pictures.estimate_plot import plot_estimates
 from ..pictures.force_plot import plot_forces
+from ..pictures.over_time_plot import plot_over_time
 from .cloth_figures import cloth_figures, stiffness_figures
 
 if TYPE_CHECKING:
@@ -60,6 +62,8 @@ def write_figures(found: Fit, config: Config, form: str, folder: Path) -> list[s
         figures |= {f"{c.experiment.name}_{one.sensor}": plot_forces(one) for one in c.forces}
         figures |= {f"{c.experiment.name}_{name}": figure for name, figure in cloth_figures(found, c).items()}
     figures |= stiffness_figures(found)
+    figures |= {one.name: plot_along(one) for one in found.result.fields if one.place == "joint"}
+    figures |= {f"{one.recording}_{one.name}": plot_over_time(one) for one in found.result.over_time}
     published = _published(found, config)
     figures["estimates"] = plot_estimates(found.result.estimates, published=published, title=config.experiment.name)
     for name, figure in figures.items():
@@ -76,8 +80,9 @@ def figure_files(experiments: Sequence[Experiment], config: Config) -> list[str]
     for e in experiments:
         names += [] if not _follows_markers(e) else [f"{e.name}_markers", f"{e.name}_residuals"]
         names += [f"{e.name}_{sensor.name}" for sensor in e.forces]
-        names += [f"{e.name}_{cloth}" for cloth in e.scene.cloths]
-        names += [cloth.field.name for cloth in e.scene.cloths.values() if cloth.field is not None]
+        names += [f"{e.name}_{name}" for name in (*e.scene.cloths, *e.scene.over_time)]
+        varied = (*e.scene.cloths.values(), *e.scene.ropes.values())
+        names += [one.field.name for one in varied if one.field is not None]
     return [f"{name}.{form}" for name in names]
 
 

@@ -166,6 +166,11 @@ class Rope(Strand):
     )
     plane: Vector | None = key(None, "unit normal of the plane that the rope stays in")
     set_modes: list[int] = key([], "k of rest-curvature modes cos(k pi s / length), each adds <name>_set_<k> (1/m)")
+    softness_modes: list[int] = key(
+        [],
+        "the same of the logarithm of the bending compliance: <name>_softness_<k>. With 1, 2 and so on, "
+        "[smooth.<name>_softness] fits them with a prior",
+    )
 
 
 class Rod(Strand):
@@ -198,7 +203,11 @@ class Rod(Strand):
         [], "k of rest-curvature modes cos(k pi s / length) about both axes: <name>_curvature_1_<k>, _2_<k> (1/m)"
     )
     twist_modes: list[int] = key([], "the same of the rest twist: <name>_twist_<k> (1/m)")
-    softness_modes: list[int] = key([], "the same of the logarithm of the bending compliance: <name>_softness_<k>")
+    softness_modes: list[int] = key(
+        [],
+        "the same of the logarithm of the bending compliance: <name>_softness_<k>. With 1, 2 and so on, "
+        "[smooth.<name>_softness] fits them with a prior",
+    )
     density_modes: list[int] = key([], "the same of the density, relative to it: <name>_density_<k>")
     slid_modes: list[int] = key(
         [],

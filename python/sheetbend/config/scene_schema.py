@@ -120,6 +120,44 @@ class Force(Section):
         return self
 
 
+class UnknownForce(Section):
+    """A force over time that nobody measured, such as that of a hand or a draft, on particles, along a rope or on a
+    point of a body, `sb.add_unknown_force`. A list: [[scene.unknown_force]]. A fit finds it with its interval, of each
+    recording of a motion its own, under a prior of zero mean; [smooth.NAME] may give the size and the length of the
+    prior."""
+
+    name: Name = key("push", "prefix of its quantities")
+    particles: list[Reference] = key([], "each of them bears the whole force")
+    rope: Name | None = key(None, "the [[scene.rope]] or [[scene.rod]] along which it is spread evenly, instead")
+    body: Name | None = key(None, "the [[scene.body]] that it acts on, instead")
+    point: Vector = key([0.0, 0.0, 0.0], "where it acts, in the body's frame", "m")
+    scale: Finite = key(..., "an order of magnitude of the force", "N", gt=0)
+    spacing: Finite = key(..., "between knots; the force is linear between them", "s", gt=0)
+    duration: Finite | None = key(
+        None, "from the scene's start to the last knot; to the end of the recording when left out", "s", gt=0
+    )
+
+    @model_validator(mode="after")
+    def _acts_on_one(self) -> Self:
+        if bool(self.particles) + (self.rope is not None) + (self.body is not None) != 1:
+            raise ValueError("must act on one of particles, rope and body|give one of them")
+        if self.body is None and "point" in self.model_fields_set:
+            raise ValueError("has a point without its body|add body")
+        return self
+
+
+class UnknownWind(Section):
+    """[scene.unknown_wind]: a wind over time that nobody measured, added to the constant one, `sb.add_unknown_wind`. It
+    blows on the cloths that have `air_normal` or `air_tangential`. A fit finds it like an unknown force."""
+
+    name: Name = key("gust", "prefix of its quantities")
+    scale: Finite = key(..., "an order of magnitude of the wind", "m/s", gt=0)
+    spacing: Finite = key(..., "between knots; the wind is linear between them", "s", gt=0)
+    duration: Finite | None = key(
+        None, "from the scene's start to the last knot; to the end of the recording when left out", "s", gt=0
+    )
+
+
 class Tool(Section):
     """A tool whose poses were recorded, such as a robot's hand, `sb.Tool`. A list: [[scene.tool]]. Its poses are in a
     frame of their own; the transform to the recording's frame is corrected by the quantities <name>_x, <name>_y,
@@ -229,6 +267,8 @@ class SceneSection(Section):
     constraints: list[Constraints] = key([], "constraint groups")
     point_mass: list[PointMass] = key([], "hung masses")
     force: list[Force] = key([], "forces over time")
+    unknown_force: list[UnknownForce] = key([], "forces over time that a fit finds")
+    unknown_wind: UnknownWind | None = key(None, "[scene.unknown_wind], which a fit finds; none when left out")
     tool: list[Tool] = key([], "tools whose poses were recorded")
     drive: list[Drive] = key([], "motion taken from markers, or from a tool")
     collider: list[ColliderSection] = key([], "shapes that ropes and cloths touch")
@@ -261,6 +301,6 @@ class SceneSection(Section):
 
     @model_validator(mode="after")
     def _wind_blows_on_something(self) -> Self:
-        if self.wind is not None and not any(cloth.in_air for cloth in self.cloth):
+        if (self.wind or self.unknown_wind) and not any(cloth.in_air for cloth in self.cloth):
             raise ValueError("has a wind that blows on nothing|give air_normal to a [[scene.cloth]]")
         return self

@@ -28,6 +28,7 @@ from .rope_points import Seats
 from .ropes import build_rope
 from .solids import build_solid
 from .tools import tool_named
+from .unknown_inputs import add_unknown_inputs
 from .winds import add_winds
 
 T = TypeVar("T")
@@ -87,6 +88,7 @@ def build_scene(
         with located(f"scene.quantities.{quantity}"):
             scene.add_quantity(quantity, **extra.model_dump())
     add_forces(scene, section.force, particles.find)
+    add_unknown_inputs(scene, section, moment, particles.find)
     for path, drive in _each("drive", section.drive):
         _add_drive(scene, particles, path, drive, moment, tools)
     add_contacts(scene, section, particles.named, tools, folder)

@@ -240,15 +240,21 @@ class GivenSection(Section):
 
 
 class SmoothSection(Section):
-    """A field of stiffness that is fitted with a smoothness prior. One table each: [smooth.NAME], NAME being
-    "<solid>_stiffness" of a solid with clusters and `stiffness_modes`, or "<cloth>_stiffness" of a cloth with them. The
-    modes are then parameters."""
+    """A field that is fitted with a smoothness prior. One table each: [smooth.NAME], NAME being "<solid>_stiffness" of
+    a solid with clusters and `stiffness_modes`, "<cloth>_stiffness" of a cloth with them, "<rope>_softness" of a rope
+    or rod with `softness_modes`, or the name of an unknown force or wind, which needs no table. The modes are then
+    parameters."""
 
     size: Finite | None = key(
-        None, "root mean square of ln E about its mean; found from the recordings when left out", gt=0
+        None,
+        "root mean square of ln E about its mean, or of a force (N) or wind (m/s) along each axis; found from the "
+        "recordings when left out",
+        gt=0,
     )
     length: Finite | None = key(
-        None, "over which neighbors are alike; found from the recordings when left out", "m", gt=0
+        None,
+        "over which neighbors are alike, m; of a force or wind the time, s; found from the recordings when left out",
+        gt=0,
     )
 
 
@@ -311,7 +317,7 @@ class Config(Section):
     recording: list[RecordingSection] = key([], "the recordings")
     parameters: dict[str, ParameterSection] = key({}, "what is fitted")
     given: dict[str, GivenSection] = key({}, "how uncertain the numbers are that the fit takes as given")
-    smooth: dict[str, SmoothSection] = key({}, "fields of stiffness that are fitted with a smoothness prior")
+    smooth: dict[str, SmoothSection] = key({}, "fields that are fitted with a smoothness prior")
     fit: FitSection = key(FitSection(), "how the fit runs")
     output: OutputSection = key(OutputSection(), "what is written")
     published: dict[str, Finite | Window] = key(

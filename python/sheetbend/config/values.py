@@ -22,11 +22,16 @@ def with_values(config: Config, values: Mapping[str, float]) -> Config:
     """
     parameters = dict(config.parameters)
     recordings = list(config.recording)
+    wind = config.scene.unknown_wind
+    fields = {*config.smooth, *(force.name for force in config.scene.unknown_force), *([wind.name] if wind else [])}
     names = [r.name or Path(r.file).stem for r in recordings]
     for name, value in values.items():
         base, _, recording = name.removesuffix("]").partition("[")
-        if any(base.startswith(f"{field}_") for field in config.smooth):  # a mode of a stiffness field
-            recordings = [r.model_copy(update={"values": {**r.values, base: value}}) for r in recordings]
+        if any(base.startswith(f"{field}_") for field in fields):  # a mode of a field
+            recordings = [
+                r.model_copy(update={"values": {**r.values, base: value}}) if recording in ("", own) else r
+                for r, own in zip(recordings, names, strict=True)
+            ]
             continue
         section = parameters.get(base)
         if section is None or section.tied_to is not None or not math.isfinite(value):

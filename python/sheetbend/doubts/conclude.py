@@ -91,6 +91,7 @@ def judged_parameters(
         limits=impossible_ahead(problem, u, r, J),
         fixes=_beyond_scenes(problem),
         bodies=bodies_of(problem, u),
+        linear_ones=_of_inputs(problem),
     )
     return judged, () if profiles is None else tuple(profiles.lower)
 
@@ -100,6 +101,12 @@ def impossible_ahead(problem: FitProblem, u: Array, r: Array, J: Array) -> dict[
     in the parameters themselves goes beyond it. At a minimum inside there is no such step."""
     coordinates = problem.coordinates
     return coordinates.beyond(gauss_newton(problem.parameters, u, J, r)) if coordinates.charts else {}
+
+
+def _of_inputs(problem: FitProblem) -> set[str]:
+    """The parameters that make up unknown inputs over time, on which motions depend almost linearly."""
+    modes = {mode for e in problem.experiments for own in e.scene.over_time.values() for mode in own.modes}
+    return {name for name in problem.parameters.free if name.partition("[")[0] in modes}
 
 
 def _beyond_scenes(problem: FitProblem) -> dict[tuple[str, str], str]:

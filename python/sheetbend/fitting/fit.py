@@ -159,9 +159,11 @@ def fit(
               rad, "force_delay" in s.
 
             0 says that a value is exact. `FitResult.premises` holds the effect of each given value in any case.
-        smooth: fields of stiffness (`stiffness_modes` of a cloth or a solid of clusters) to fit with a smoothness
-            prior, by name, such as {"toy_stiffness": sb.Smooth()}. What `Smooth` leaves open, the size and the length
-            of the prior, is found from the recordings (`FitResult.fields`).
+        smooth: fields of stiffness (`stiffness_modes` of a cloth or a solid of clusters, `softness_modes` from 1 on of
+            a rope or rod) to fit with a smoothness prior, by name, such as {"toy_stiffness": sb.Smooth()}. What
+            `Smooth` leaves open, the size and the length of the prior, is found from the recordings
+            (`FitResult.fields`). Unknown forces and winds of the scenes (`add_unknown_force`) are fitted in any case;
+            name one to give its size or length (`FitResult.over_time`).
         leave_one_out: also predict each recording without a held-out part by a fit to the other recordings.
         profiles: follow the cost to both ends of every interval while all other parameters are fitted again; with more
             than 60 parameters only for weak ones. False: linear intervals, which need no further simulation.

@@ -114,7 +114,7 @@ def identify(
         instead: other plans to compare with, by what is changed in words, such as the same experiments with a mass
             hung on.
         smooth: fields of stiffness, as `fit` takes them. A size or length that `Smooth` does not give cannot be found
-            without data: 0.5 and a quarter of the solid's extent are taken.
+            without data: 0.5 (of unknown inputs half of their `scale`) and a quarter of the extent are taken.
         suggest: also predict what a further marker, a force sensor, the same recordings once more, or each parameter
             measured to 1 % would give.
         threads: over experiments and Jacobian columns.

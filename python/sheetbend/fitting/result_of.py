@@ -24,7 +24,7 @@ from ..experiment.clock import outside, told_clocks
 from ..experiment.found_start import start_moved
 from ..minimum.continuity import shot_motions
 from ..minimum.counts import counted
-from ..minimum.field_fits import field_fits
+from ..minimum.field_fits import Fields
 from ..minimum.fine_meshes import at_the_limit
 from ..minimum.smooth import Field
 from ..report.dependence import with_dependences
@@ -74,7 +74,7 @@ def result_of(
         comparisons: measured against simulated, per experiment.
         left_out: of the experiments that a fit to the others predicts.
         corrected: corrections of driven markers by experiment.
-        fields: of stiffness, with their priors.
+        fields: with their priors.
         interrupted: by Ctrl-C, at any time.
     """
     problem, best, found = reached.problem, reached.best, reached.found
@@ -97,6 +97,7 @@ def result_of(
         *outside(conclusion.experiments, conclusion.values),
         *(() if interrupted else (*misread(problem, best.u), *implausible(problem))),
     )
+    found_fields = Fields(at.problem, at.u, fields)
     baselines = (c.baseline_words for c in (*comparisons, *left_out.values()) if c.baseline_words)
     result = FitResult(
         estimates=estimates,
@@ -129,7 +130,8 @@ def result_of(
         growth=growth_rows(found.growths, reached.growths),
         contacts=contacts,
         shot=shot_motions(problem, best.u),
-        fields=field_fits(at.problem, at.u, fields),
+        fields=found_fields.stiffness(),
+        over_time=found_fields.over_time(),
         kinks=() if interrupted else kinks(at.problem, at.u, estimates),
         windows=best.windows,
         evaluations=effort.evaluations,

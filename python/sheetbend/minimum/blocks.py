@@ -175,6 +175,8 @@ class ManyProblem:
             raise InputError("start", "is not estimated of many recordings", unknown[:5], "use sheetbend.fit")
         if in_windows := [e.name for e in experiments if e.shooting is not None]:
             raise InputError("shooting", "does not go with many recordings", in_windows[:5], "use sheetbend.fit")
+        if over_time := [e.name for e in experiments if e.scene.over_time]:
+            raise InputError("scene", "has unknown inputs over time", over_time[:5], "use sheetbend.fit")
         self.parameters = expanded_to(parameters, self.experiments)
         self.coordinates = Coordinates(self.parameters)
         place = {name: column for column, name in enumerate(self.parameters.free)}

@@ -1,75 +1,134 @@
-"""The stiffness of each place of a field, and its interval, at the end of a fit.
+"""The values of a field and their intervals at the end of a fit: the stiffness of each place, or an input at each knot.
 
-In the linear picture ln E of a place has a normal distribution under a prior of a given size and length. Where these
-were found from the recordings, it is a mixture over all sizes and lengths that are possible, weighted by their marginal
-likelihood. The interval about the estimate holds 95 % of the mixture.
+In the linear picture a value (of a stiffness its logarithm) has a normal distribution under a prior of a given size and
+length. Where these were found from the recordings, it is a mixture over all sizes and lengths that are possible,
+weighted by their marginal likelihood. The interval about the estimate holds 95 % of the mixture.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from ..arrays.timeseries import Array
+from ..objects.over_time import OverTime
+from ..objects.stiffness_field import StiffnessField
 from ..result.field import FieldFit
+from ..result.over_time import OverTimeFit
 from .problem import FitProblem
-from .smooth import Field, Picture
+from .smooth import Field, Modes, Picture
 
 LEVEL = 0.95
 HALVINGS = 40  # of the range of half-widths
 FINEST = 0.1  # of the modes
 
 
-def field_fits(problem: FitProblem, u: Array, fields: Sequence[Field]) -> tuple[FieldFit, ...]:
-    """What a fit that ended at u (free,) found of its fields."""
-    picture = Picture.at(problem, u, fields) if fields else None
-    if picture is None:
-        return ()
-    columns, values = list(problem.parameters.free), problem.parameters.to_physical(u)
-    found = []
-    for i, field in enumerate(fields):
-        modes = field.modes
-        mean = values.get(modes.stiffness, _given(problem, modes.stiffness))
-        E = mean * np.exp(modes.shapes @ u[picture.columns[i]])
-        level = columns.index(modes.stiffness) if modes.stiffness in columns else None
-        half, left, of_modes = spread(picture, fields, i, level)
-        finest = float(np.mean(of_modes[-math.ceil(FINEST * len(of_modes)) :]))
-        found.append(
-            FieldFit(
-                name=modes.name,
-                size=field.size,
-                size_lower=field.size_ends[0],
-                size_upper=field.size_ends[1],
-                length=field.length,
-                length_lower=field.length_ends[0],
-                length_upper=field.length_ends[1],
-                centers=tuple((float(x), float(y), float(z)) for x, y, z in modes.centers),
-                stiffness=tuple(E.tolist()),
-                half_widths=tuple(half.tolist()),
-                left=tuple(left.tolist()),
-                finest=finest if modes.finer.shape[1] else None,
-                unit=modes.unit,
-                place=modes.place,
+class Fields:
+    """What a fit that ended at u (free,) found of its fields; nothing where its physics has no answer."""
+
+    def __init__(self, problem: FitProblem, u: Array, fields: Sequence[Field]) -> None:
+        self._problem, self._u, self._fields = problem, u, tuple(fields)
+        self._picture = Picture.at(problem, u, fields) if fields else None
+
+    def stiffness(self) -> tuple[FieldFit, ...]:
+        """Of fields of stiffness."""
+        if self._picture is None:
+            return ()
+        columns, values = list(self._problem.parameters.free), self._problem.parameters.to_physical(self._u)
+        found = []
+        for i, field in enumerate(self._fields):
+            modes = field.modes
+            if not isinstance(modes, StiffnessField):
+                continue
+            mean = values.get(modes.stiffness, _given(self._problem, modes.stiffness))
+            E = mean * np.exp(modes.shapes @ self._u[self._picture.columns[i]])
+            level = columns.index(modes.stiffness) if modes.stiffness in columns else None
+            half, left, of_modes = spread(self._picture, self._fields, i, level)
+            finest = float(np.mean(of_modes[-math.ceil(FINEST * len(of_modes)) :]))
+            found.append(
+                FieldFit(
+                    name=modes.name,
+                    **_prior(field),
+                    centers=tuple((float(x), float(y), float(z)) for x, y, z in modes.centers),
+                    stiffness=tuple(E.tolist()),
+                    half_widths=tuple(half.tolist()),
+                    left=tuple(left.tolist()),
+                    finest=finest if modes.finer.shape[1] else None,
+                    unit=modes.unit,
+                    place=modes.place,
+                )
             )
-        )
-    return tuple(found)
+        return tuple(found)
+
+    def over_time(self) -> tuple[OverTimeFit, ...]:
+        """Of forces and winds over time, in each recording."""
+        if self._picture is None:
+            return ()
+        found = []
+        for i, field in enumerate(self._fields):
+            begin = 0
+            for recording, (modes, names) in zip(self._recordings(field), field.each, strict=True):
+                if not isinstance(modes, OverTime):
+                    continue
+                own = self._picture.columns[i][begin : begin + len(names)]
+                begin += len(names)
+                half, left, _ = spread(self._picture, self._fields, i, None, (modes, own))
+                found.append(
+                    OverTimeFit(
+                        name=modes.name,
+                        recording=recording,
+                        kind=modes.kind,
+                        unit=modes.unit,
+                        **_prior(field),
+                        times=tuple(modes.times.tolist()),
+                        values=_by_knot(modes.shapes @ self._u[own]),
+                        half_widths=_by_knot(half),
+                        left=_by_knot(left),
+                        modes=names,
+                    )
+                )
+        return tuple(found)
+
+    def _recordings(self, field: Field) -> list[str]:
+        """Of each modes of a field; of those that are shared, the first that has them."""
+        name = field.modes.modes[0]
+        return list(field.own) or [next(e.name for e in self._problem.experiments if name in e.scene.quantities)]
 
 
-def spread(picture: Picture, fields: Sequence[Field], i: int, level: int | None) -> tuple[Array, Array, Array]:
-    """Half-widths of ln E (places,) of one field, the shares of the prior's variance that the data leave of each, and
-    those of each mode (modes,).
+def _prior(field: Field) -> dict[str, Any]:
+    return {
+        "size": field.size,
+        "size_lower": field.size_ends[0],
+        "size_upper": field.size_ends[1],
+        "length": field.length,
+        "length_lower": field.length_ends[0],
+        "length_upper": field.length_ends[1],
+    }
+
+
+def _by_knot(values: Array) -> tuple[tuple[float, float, float], ...]:
+    return tuple((float(x), float(y), float(z)) for x, y, z in values.reshape(-1, 3))
+
+
+def spread(
+    picture: Picture, fields: Sequence[Field], i: int, level: int | None, part: tuple[Modes, Array] | None = None
+) -> tuple[Array, Array, Array]:
+    """Half-widths (places,) of one field, of a stiffness those of ln E, the shares of the prior's variance that the
+    data leave of each, and those of each mode (modes,).
 
     The priors of other fields are taken as exact.
 
     Args:
         level: column of the mean stiffness; None = it is not fitted.
+        part: modes of one recording and their columns, where each has its own.
     """
-    modes, own = fields[i].modes, picture.columns[i]
+    modes, own = (fields[i].modes, picture.columns[i]) if part is None else part
     at_minimum, _ = picture.solved(fields)
     each, weights = picture.possible(fields, i)
-    shifts, variances, left, of_modes = [], [], np.zeros(len(modes.centers)), np.zeros(len(own))
+    shifts, variances, left, of_modes = [], [], np.zeros(len(modes.shapes)), np.zeros(len(own))
     for one, weight in zip(each, weights, strict=True):
         step, root = picture.solved([*fields[:i], one, *fields[i + 1 :]])
         shift, about = modes.shapes @ (step - at_minimum)[own], modes.shapes @ root[own]

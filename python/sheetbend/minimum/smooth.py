@@ -1,16 +1,18 @@
-"""A smoothness prior of a stiffness field: its size and its length are found from the recordings before a fit searches.
+"""A smoothness prior of a field: its size and its length are found from the recordings before a fit searches.
 
-The modes of a field are parameters with independent priors, whose deviations follow from a size and a length
-(`StiffnessField.deviations`). These follow from the marginal likelihood: all parameters integrated out of the linear
-picture at the minimum that belongs to the last ones, as the gaps of windows are found (`continuity`). Data count with
-the variance and the autocorrelation that their residuals show (empirical Bayes; MacKay 1992, Neural Computation 4).
+A field is a stiffness that varies from place to place, or a force or a wind over time that nobody measured. Its modes
+are parameters with independent priors, whose deviations follow from a size and a length (`deviations`). These follow
+from the marginal likelihood: all parameters integrated out of the linear picture at the minimum that belongs to the
+last ones, as the gaps of windows are found (`continuity`). Data count with the variance and the autocorrelation that
+their residuals show (empirical Bayes; MacKay 1992, Neural Computation 4).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from dataclasses import field as of_field
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from ..arrays.checks import check_kind, is_number
 from ..arrays.timeseries import Array
 from ..errors import InputError
 from ..experiment.experiment import Experiment
+from ..objects.over_time import OverTime
 from ..objects.stiffness_field import StiffnessField
 from ..quantities.parameters import Parameter, Parameters
 from ..statistics.spectral import autocorrelation
@@ -26,7 +29,7 @@ from .parts import expanded_to
 from .problem import FitProblem
 from .progress import Observer
 
-FIRST_SIZE, FIRST_LENGTH = 0.5, 0.25  # of ln E; of the extent
+FIRST_SIZE, FIRST_LENGTH = 0.5, 0.25  # of the scale, which is 1 for ln E; of the extent
 SIZES, LENGTHS = (1e-3, 10.0), (0.1, 10.0)  # that are looked at; lengths of the shortest wave's and of the extent
 LOOKED = 33  # sizes, and as many lengths
 FINER = 4  # times closer, about the best
@@ -36,13 +39,16 @@ LIKELY = 3.841  # of twice the logarithm of a likelihood: 95 % of a chi-square w
 POSSIBLE = 25.0  # likewise: what is less likely weighs less than 4e-6
 
 
+Modes = StiffnessField | OverTime
+
+
 @dataclass(frozen=True)
 class Smooth:
     """A smoothness prior; what is None is found from the recordings.
 
     Attributes:
-        size: root mean square of ln E about its mean.
-        length: m, over which neighbors are alike.
+        size: root mean square of ln E about its mean, or of an unknown force (N) or wind (m/s) along each axis.
+        length: m, over which neighbors are alike; of a force or wind the time, s.
     """
 
     size: float | None = None
@@ -60,18 +66,33 @@ class Field:
     """A field with its prior.
 
     Attributes:
-        modes: as the scene has them.
+        modes: as the scene has them, of the first scene that does.
         wanted: as it was asked for.
         size, length: of the prior.
         size_ends, length_ends: of their 95 % intervals.
+        own: by recording, its modes, where each has numbers of its own; empty where all share them.
     """
 
-    modes: StiffnessField
+    modes: Modes
     wanted: Smooth
     size: float
     length: float
     size_ends: tuple[float | None, float | None] = (None, None)
     length_ends: tuple[float | None, float | None] = (None, None)
+    own: Mapping[str, OverTime] = of_field(default_factory=dict)
+
+    @property
+    def each(self) -> Iterator[tuple[Modes, tuple[str, ...]]]:
+        """The modes of each recording, or those of all, and the names of their parameters."""
+        if not self.own:
+            yield self.modes, self.modes.modes
+        for recording, modes in self.own.items():
+            yield modes, tuple(f"{mode}[{recording}]" for mode in modes.modes)
+
+    @property
+    def deviations(self) -> Array:
+        """Standard deviations of the priors of all parameters."""
+        return np.concatenate([modes.deviations(self.size, self.length) for modes, _ in self.each])
 
     def at(self, log_size: float, log_length: float) -> Field:
         """With another size and length."""
@@ -79,37 +100,83 @@ class Field:
 
     def carried(self, parameters: Parameters) -> Parameters:
         """The parameters with this prior."""
-        sds = dict(zip(self.modes.modes, self.modes.deviations(self.size, self.length).tolist(), strict=True))
+        sds: dict[str, float] = {}
+        for modes, names in self.each:
+            own = modes.deviations(self.size, self.length).tolist()
+            sds |= dict(zip((*names, *modes.modes), [*own, *own], strict=True))
         return Parameters(replace(p, prior=(0.0, sds[p.name])) if p.name in sds else p for p in parameters.values())
 
 
 def with_fields(
     parameters: Parameters, experiments: Sequence[Experiment], smooth: Mapping[str, Smooth]
 ) -> tuple[Parameters, tuple[Field, ...]]:
-    """The parameters with those of all fields, under the prior that a search for sizes and lengths begins with.
+    """The parameters with those of all fields, under the prior that a search for sizes and lengths begins with. Those
+    of inputs over time need not be named in `smooth`, and are private where there are several recordings.
 
     Raises:
-        InputError: no scene has such a field, a mode is a parameter already, or a size or length is not positive.
+        InputError: no scene has such a field, a mode is a parameter already, a size or length is not positive, or an
+            input over time does not suit a recording.
     """
-    objects = [o for e in experiments for o in (*e.scene.solids.values(), *e.scene.cloths.values())]
-    known = {o.field.name: o.field for o in objects if o.field is not None}
+    scenes = [e.scene for e in experiments]
+    objects = [o for s in scenes for o in (*s.solids.values(), *s.cloths.values(), *s.ropes.values())]
+    known: dict[str, Modes] = {o.field.name: o.field for o in objects if o.field is not None}
+    over_time = inputs_over_time(experiments)
+    known |= {name: next(iter(own.values())) for name, own in over_time.items()}
     fields = []
     check_kind("smooth", smooth, Mapping, "give sb.Smooth() by the names of fields")
-    for name, wanted in smooth.items():
+    for name, wanted in ({name: Smooth() for name in over_time} | dict(smooth)).items():
         check_kind(f"smooth.{name}", wanted, Smooth, "give sb.Smooth()")
         if name not in known:
-            fix = f"name one of: {', '.join(known) or 'none, give a cloth or a solid of clusters stiffness_modes'}"
+            none = "none, give a cloth or a solid of clusters stiffness_modes, or a rope softness_modes from 1 on"
+            fix = f"name one of: {', '.join(known) or none}"
             raise InputError(f"smooth.{name}", "names no field of the scenes", name, fix)
-        modes = known[name]
+        private = len(over_time.get(name, ())) > 1
+        own = over_time[name] if private else {}
+        modes = max(own.values(), key=lambda m: len(m.modes)) if private else known[name]
         if twice := [mode for mode in modes.modes if mode in parameters]:
             fix = "leave them out of the parameters: smooth adds them"
             raise InputError(f"smooth.{name}", "has modes that are parameters already", twice, fix)
-        size, length = wanted.size or FIRST_SIZE, wanted.length or FIRST_LENGTH * modes.extent
-        fields.append(Field(modes, wanted, size, length))
-        quantities = next(e.scene.quantities for e in experiments if modes.modes[0] in e.scene.quantities)
-        own = [Parameter(name=m, initial=quantities[m].value, scale=quantities[m].scale) for m in modes.modes]
-        parameters = fields[-1].carried(Parameters([*parameters.values(), *own]))
+        size = wanted.size or FIRST_SIZE * modes.scale
+        fitted = {e.name for e in experiments if e.predict is None}
+        own = {recording: modes for recording, modes in own.items() if recording in fitted}
+        fields.append(Field(modes, wanted, size, wanted.length or FIRST_LENGTH * modes.extent, own=own))
+        quantities = next(e.scene.quantities for e in experiments if modes.modes[-1] in e.scene.quantities)
+        more = [
+            Parameter(
+                name=m,
+                initial=None if private else quantities[m].value,
+                scale=quantities[m].scale,
+                private=private,
+            )
+            for m in modes.modes
+        ]
+        parameters = fields[-1].carried(Parameters([*parameters.values(), *more]))
     return parameters, tuple(fields)
+
+
+def inputs_over_time(experiments: Sequence[Experiment]) -> dict[str, dict[str, OverTime]]:
+    """The unknown inputs over time of the experiments' scenes, by name and recording.
+
+    Raises:
+        InputError: one of a recording of an equilibrium, one that ends before its recording, or whose knots are farther
+            apart than the recording is long.
+    """
+    found: dict[str, dict[str, OverTime]] = {}
+    for e in experiments:
+        for name, own in e.scene.over_time.items():
+            if e.static:
+                raise InputError(f"{e.name}.static", f"has no time for the unknown {own.kind}", name, "leave it out")
+            until = float((e.held() or e.fitted()).times[-1]) - e.t0
+            spacing = float(own.times[1])
+            if spacing > until:
+                raise InputError(
+                    f"{name}.spacing", "is longer than the recording", spacing, f"give at most {until:g} s"
+                )
+            if until > own.times[-1] + spacing:
+                fix = f"give at least {until:g} s"
+                raise InputError(f"{name}.duration", "ends before the recording", own.extent, fix)
+            found.setdefault(name, {})[e.name] = own
+    return found
 
 
 def settled(
@@ -172,7 +239,7 @@ class Picture:
         if not ok:
             return None
         place = {name: k for k, name in enumerate(problem.parameters.free)}
-        columns = tuple(np.array([place[name] for name in field.modes.modes]) for field in fields)
+        columns = tuple(np.array([place[n] for _, names in field.each for n in names]) for field in fields)
         rows, prior = np.column_stack([J, r]), problem.prior_rows
         first, layout = problem.core.first_rows, problem.rows_layout()
         for i in range(len(problem.experiments)):
@@ -191,7 +258,7 @@ class Picture:
         """The triangle of Jacobian and residuals, with the rows of the fields' priors below."""
         below = []
         for field, own in zip(fields, self.columns, strict=True):
-            weight = 1.0 / field.modes.deviations(field.size, field.length)
+            weight = 1.0 / field.deviations
             rows = np.zeros((len(own), self.triangle.shape[1]))
             rows[np.arange(len(own)), own] = weight
             rows[:, -1] = weight * self.u[own]
@@ -211,7 +278,7 @@ class Picture:
         p = len(self.u)
         size = np.abs(np.diag(R))[:p]
         known = size > 1e-9 * size.max(initial=1e-300)
-        spread = sum(float(np.log(f.modes.deviations(f.size, f.length)).sum()) for f in fields)
+        spread = sum(float(np.log(f.deviations).sum()) for f in fields)
         return float(np.sum(R[p:, -1] ** 2)) + 2.0 * (float(np.log(size[known]).sum()) + spread)
 
     def heights(self, fields: Sequence[Field], i: int, size: Array, length: Array) -> Array:
@@ -263,7 +330,7 @@ def _looked_at(field: Field) -> tuple[Array, Array]:
     modes, given = field.modes, field.wanted
     wave = 1.0 / math.sqrt(max(float(modes.eigenvalues[-1]), 1e-300))
     span = (LENGTHS[0] * wave, LENGTHS[1] * modes.extent)
-    size = _spaced(*SIZES) if given.size is None else np.array([math.log(given.size)])
+    size = _spaced(*(modes.scale * s for s in SIZES)) if given.size is None else np.array([math.log(given.size)])
     return size, _spaced(*span) if given.length is None else np.array([math.log(given.length)])
 
 

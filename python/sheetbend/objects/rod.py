@@ -15,6 +15,7 @@ from ..quantities.quantities import product
 from ..scene.body import BodyPoint
 from ..scene.given import check_scene
 from ..scene.scene import Array, Scene
+from .along_rope import softness_field
 from .chain import MOST_LINKS, add_drag, add_links, add_masses
 from .grip import Grip
 from .grip_freedom import spread_shift
@@ -221,7 +222,9 @@ def add_rod(
     joints.slid(slid_modes)
     add_drag(scene, name, nodes, segments, drag_linear, drag_quadratic)
     normals = np.zeros(0, dtype=int) if frames.normals is None else frames.normals
-    built = Rod(name, nodes, line.link * np.arange(segments + 1), *frames.ghosts, frames.directors, normals)
+    varying = softness_field(name, softness_modes, (frames.at - frames.first) / segments, length)
+    arc = line.link * np.arange(segments + 1)
+    built = Rod(name, nodes, arc, *frames.ghosts, frames.directors, normals, field=varying)
     scene.ropes[name] = built
     return built
 

@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import SceneError
 from ..quantities.quantities import Term
 from ..scene.scene import Array, Scene
+from .along_rope import mode_quantities
 from .chain import first_value, voronoi_shares
 
 Factors = tuple[tuple[str, str], ...]
@@ -180,27 +181,3 @@ def weigh(scene: Scene, name: str, nodes: Array, segments: int, modes: Sequence[
         factors: Factors = ((mode, "identity"), (f"{name}_density", "identity"), (f"{name}_length", "identity"))
         for part in (slice(None, -1), slice(-1, None)):  # a ring's last node is its first
             scene.add_terms([Term("mass", nodes[part], (share * weights)[part], factors)])
-
-
-def mode_quantities(
-    scene: Scene, name: str, label: str, modes: Sequence[int], s: Array, unit: str = ""
-) -> list[tuple[str, Array]]:
-    """A new quantity `<name>_<label>_<k>` per mode k, and its weights cos(k pi s) at shares s of the rod's length."""
-    field = f"{name}.{label.removesuffix('_1').removesuffix('_2')}_modes"
-    scale = 1.0 if unit else 0.3
-    return [
-        (
-            scene.add_quantity(f"{name}_{label}_{k}", 0.0, unit, positive=False, scale=scale),
-            np.cos(k * np.pi * s),
-        )
-        for k in _checked(field, modes)
-    ]
-
-
-def _checked(field: str, modes: Sequence[int]) -> tuple[int, ...]:
-    """The modes: whole numbers from 0 on, each once."""
-    given = list(modes) if np.iterable(modes) else [None]
-    bad = [k for k in given if not isinstance(k, int | np.integer) or k < 0]
-    if bad or len(set(given)) < len(given):
-        raise SceneError(field, "must be whole numbers from 0 on, each once", modes, "give such as (0, 1)")
-    return tuple(int(k) for k in modes)

@@ -4,7 +4,8 @@ depend on the mesh."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from dataclasses import field as of_field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,6 +29,7 @@ from .grip import Grip
 from .rod_shape import initial_shape
 from .rope_grips import checked_grips, clamp, hold, lengthen, loosen, placed, ride
 from .rope_joints import add_joints, check_set
+from .stiffness_field import StiffnessField
 
 GHOST = 0.01  # length of a clamp's ghost link over a rope's link; only its direction matters
 
@@ -42,6 +44,7 @@ class Rope:
         arc_length: (n,) m, how far each particle is from the start along the rope at rest.
         start_ghost, end_ghost: hidden nodes that give a clamped end its direction, whose numbers index
             `Trajectory.nodes`; None where the end is not clamped.
+        field: how EI varies along it; None = it does not.
     """
 
     name: str
@@ -49,6 +52,7 @@ class Rope:
     arc_length: Array
     start_ghost: int | None = None
     end_ghost: int | None = None
+    field: StiffnessField | None = of_field(default=None, kw_only=True)
 
     @property
     def length(self) -> float:
@@ -121,13 +125,14 @@ def add_rope(
     end_lead: float | None = None,
     plane: ArrayLike | None = None,
     set_modes: Sequence[int] = (),
+    softness_modes: Sequence[int] = (),
 ) -> Rope:
     """Add a rope of `segments` equal links to a scene.
 
     Quantities: `<name>_length` m, `<name>_density` kg/m, and where given `_EA` N, `_EI` N m^2, `_stretch_damping` s,
     `_bend_damping` s, `_loss_factor`, `_loss_frequency` Hz, `_drag_linear` N s/m^2, `_drag_quadratic` N s^2/m^3,
-    `_start_angle` and `_end_angle` rad, `_set_<k>` 1/m, `_start_tilt_1`, `_start_tilt_2` and so on rad,
-    `_start_shift_1` to `_3` and `_end_shift_1` to `_3` m, `_start_lead` and `_end_lead` m.
+    `_start_angle` and `_end_angle` rad, `_set_<k>` 1/m, `_softness_<k>`, `_start_tilt_1`, `_start_tilt_2` and so on
+    rad, `_start_shift_1` to `_3` and `_end_shift_1` to `_3` m, `_start_lead` and `_end_lead` m.
 
     Args:
         length: m; the length of `points` by default.
@@ -158,6 +163,8 @@ def add_rope(
         clamp_angles: add `_start_angle` / `_end_angle`, rotations of the clamps about `plane`.
         plane: (3,), unit normal of the plane that the rope stays in; needed by clamp_angles and set_modes.
         set_modes: k of rest-curvature modes cos(k pi s / length) about `plane`; each amplitude starts at zero.
+        softness_modes: k of the same modes of the logarithm of the bending compliance over length/EI: a rope that is
+            stiffer in places. With 1, 2 and so on, `smooth` of `fit` gives them a prior: "<name>_softness".
 
     Returns:
         Rope, also kept as `scene.ropes[name]`.
@@ -195,6 +202,8 @@ def add_rope(
             f"{name}.plane", "is missing", None, "give the unit normal that the clamp angles or the set turn about"
         )
     check_set(name, set_modes, EI)
+    if EI is None and len(softness_modes):
+        raise SceneError(f"{name}.softness_modes", "need EI", EI, "give EI, or leave them out")
 
     nodes = scene.add_particles(shape, 0.0, speeds)
     link = length / segments
@@ -217,7 +226,8 @@ def add_rope(
     ]
     built = Rope(name, nodes, arc, *ghosts)
     if EI is not None:
-        add_joints(scene, built, EI, taus[1], normal, set_modes)
+        varying = add_joints(scene, built, EI, taus[1], normal, set_modes, softness_modes)
+        built = replace(built, field=varying)
     add_drag(scene, name, nodes, segments, drag_linear, drag_quadratic)
     scene.ropes[name] = built
     for end, grip, ghost, lead in zip(("start", "end"), grips, ghosts, (start_lead, end_lead), strict=True):

@@ -10,8 +10,10 @@ from ..arrays.checks import is_list, is_number
 from ..errors import SceneError
 from ..quantities.quantities import Term, product
 from ..scene.scene import Array, Scene
+from .along_rope import mode_quantities, softness_field
 from .chain import TimeConstant, first_value, voronoi_shares
 from .rope_grips import Chain
+from .stiffness_field import StiffnessField
 
 
 def check_set(name: str, modes: Sequence[int], EI: float | None) -> None:
@@ -23,8 +25,14 @@ def check_set(name: str, modes: Sequence[int], EI: float | None) -> None:
 
 
 def add_joints(
-    scene: Scene, rope: Chain, EI: float, damping: TimeConstant | None, normal: Array | None, modes: Sequence[int]
-) -> None:
+    scene: Scene,
+    rope: Chain,
+    EI: float,
+    damping: TimeConstant | None,
+    normal: Array | None,
+    modes: Sequence[int],
+    softness_modes: Sequence[int] = (),
+) -> StiffnessField | None:
     """Let a rope bend at its inner nodes and clamped ends; alpha = Voronoi length / EI.
 
     A clamped end counts the rope's own half link.
@@ -34,9 +42,13 @@ def add_joints(
         damping: Kelvin-Voigt time constant; None = undamped.
         normal: (3,) unit normal of the plane of the rest curvature.
         modes: k of the modes cos(k pi s / length) of the rest curvature, new quantities `<rope>_set_<k>` 1/m.
+        softness_modes: k of the same modes of the logarithm of the compliance, new quantities `<rope>_softness_<k>`.
+
+    Returns:
+        The field of EI, where these make one (`softness_field`).
 
     Raises:
-        SceneError: a rope without a joint.
+        SceneError: a rope without a joint, or modes that are none.
     """
     name, nodes, arc = rope.name, rope.particles, rope.arc_length
     before, behind = ([] if ghost is None else [ghost] for ghost in (rope.start_ghost, rope.end_ghost))
@@ -57,14 +69,15 @@ def add_joints(
     _, first, _ = scene.group(group)
     share = voronoi_shares(len(nodes) - 1)
     stiffness = scene.add_quantity(f"{name}_EI", EI, "N m^2")
-    terms: list[Term] = [
-        product("compliance", first + i, share[node], {length: "identity", stiffness: "inverse"})
-        for i, node in enumerate(at)
-    ]
+    s = np.array(at) / (len(nodes) - 1)
+    softer = mode_quantities(scene, name, "softness", softness_modes, s)
+    joints = first + np.arange(len(at))
+    terms = [Term("compliance", joints, share[at], ((length, "identity"), (stiffness, "inverse")), tuple(softer))]
     if damping is not None:
         scale, tau = damping
-        factors = {**tau, stiffness: "identity", length: "inverse"}
-        terms += [product("damping", first + i, scale / share[node], factors) for i, node in enumerate(at)]
+        factors = (*tau.items(), (stiffness, "identity"), (length, "inverse"))
+        stiffer = tuple((mode, -weights) for mode, weights in softer)
+        terms.append(Term("damping", joints, scale / share[at], factors, stiffer))
     offset = first_value(scene, group)
     for k in modes:
         mode = scene.add_quantity(f"{name}_set_{k}", 0.0, "1/m", positive=False, scale=1.0 / arc[-1])
@@ -78,3 +91,4 @@ def add_joints(
             for i, node in enumerate(at)
         ]
     scene.add_terms(terms)
+    return softness_field(name, softness_modes, s, float(arc[-1]))

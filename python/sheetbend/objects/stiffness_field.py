@@ -1,11 +1,11 @@
 """A stiffness that varies smoothly from place to place, as the logarithm of a mean one and smooth modes.
 
-Places are the clusters of a solid or the triangles of a cloth. ln E of place c is ln E + sum_k shapes[c, k] q_k, with
-one quantity q_k for each mode. The modes are eigenvectors of the Laplace operator, that of the graph of clusters or in
-finite elements on the mesh of a cloth: the first bends least from place to place, the next more. Their eigenvalues are
-squared wave numbers (1/m^2), so a prior of a given length is one of independent modes, whose deviations fall as
-1/(1 + length^2 eigenvalue): a field of Matern's class (Whittle 1954, Biometrika 41; Lindgren, Rue & Lindstrom 2011, J.
-R. Stat. Soc. B 73).
+Places are the clusters of a solid, the triangles of a cloth or the joints of a rope (`along_rope`). ln E of place c is
+ln E + sum_k shapes[c, k] q_k, with one quantity q_k for each mode. The modes are eigenvectors of the Laplace operator,
+that of the graph of clusters or in finite elements on the mesh of a cloth: the first bends least from place to place,
+the next more. Their eigenvalues are squared wave numbers (1/m^2), so a prior of a given length is one of independent
+modes, whose deviations fall as 1/(1 + length^2 eigenvalue): a field of Matern's class (Whittle 1954, Biometrika 41;
+Lindgren, Rue & Lindstrom 2011, J. R. Stat. Soc. B 73).
 """
 
 from __future__ import annotations
@@ -34,10 +34,11 @@ class StiffnessField:
         modes: names of the quantities of the modes, smoothest first.
         eigenvalues: (places,) 1/m^2, ascending, of all modes; the first is that of the constant.
         shapes: (places, modes), of mean square 1: a quantity is the root mean square of what it adds to ln E.
-        centers: (places, 3) m, at rest.
+        centers: (places, 3) m, at rest; along a rope its arc length, 0 and 0.
         finer: (places, others) likewise, of the modes that have no quantity.
         unit: of the stiffness.
         place: what one place is called.
+        rms: root mean square of the shapes where it is not 1.
     """
 
     stiffness: str
@@ -48,11 +49,17 @@ class StiffnessField:
     finer: Array
     unit: str = "Pa"
     place: str = "cluster"
+    rms: float = 1.0
 
     @property
     def name(self) -> str:
         """`<material>_stiffness`."""
         return self.modes[0].removesuffix("_1")
+
+    @property
+    def scale(self) -> float:
+        """An order of magnitude of its deviations, in ln E."""
+        return 1.0
 
     @property
     def extent(self) -> float:
@@ -69,7 +76,7 @@ class StiffnessField:
         return np.asarray(np.sum((self.finer * self._of_all(size, length)[len(self.modes) :]) ** 2, axis=1))
 
     def _of_all(self, size: float, length: float) -> Array:
-        return np.asarray(size * shares(self.eigenvalues[1:], length))
+        return np.asarray(size / self.rms * shares(self.eigenvalues[1:], length))
 
 
 def shares(eigenvalues: Array, length: float) -> Array:
@@ -132,7 +139,7 @@ def modes_of_triangles(corners: Array, triangles: NDArray[np.intp]) -> tuple[Arr
     """
     _, places, laplacian, area = laplacian_of_triangles(corners, triangles)
     values, shapes = modes_of_laplacian(laplacian, area, float(area.sum()))
-    return values, _signed(shapes)[places].mean(axis=1)
+    return values, signed(shapes)[places].mean(axis=1)
 
 
 def modes_of_laplacian(laplacian: Array, sizes: Array, whole: float) -> tuple[Array, Array]:
@@ -183,10 +190,10 @@ def modes_of(centers: Array, neighbors: NDArray[np.intp]) -> tuple[Array, Array]
     laplacian += laplacian.T
     laplacian -= np.diag(laplacian.sum(axis=1))
     values, vectors = np.linalg.eigh(laplacian)
-    return np.maximum(values, 0.0), _signed(vectors) * np.sqrt(n)
+    return np.maximum(values, 0.0), signed(vectors) * np.sqrt(n)
 
 
-def _signed(vectors: Array) -> Array:
+def signed(vectors: Array) -> Array:
     """With the largest entry of each column positive."""
     strongest = vectors[np.argmax(np.abs(vectors), axis=0), np.arange(vectors.shape[1])]
     return np.asarray(vectors * np.sign(strongest))

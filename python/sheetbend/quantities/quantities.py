@@ -84,6 +84,8 @@ class Term:
 class Builder(Protocol):
     """A scene under construction, as seen by what adds particles' loads and named numbers to it."""
 
+    terms: list[Term]
+
     @property
     def particle_count(self) -> int: ...
 

@@ -17,6 +17,7 @@ from .report_bootstrap import bootstrap
 from .report_contact import contact_sections
 from .report_driven import driven_sections
 from .report_fields import stiffness_fields
+from .report_over_time import inputs_over_time, without_modes
 from .report_premises import premises
 from .report_profiles import lopsided_profiles
 from .report_recordings import forces, held_out_motion, recordings
@@ -41,6 +42,7 @@ FAR_BELOW = 0.02  # of sigma: residuals so small tell of a sigma in another unit
 
 def sections(result: FitData) -> list[Section]:
     """The report as data, empty sections left out."""
+    whole, result = result, without_modes(result)
     parts = [
         _misfit(result),
         _parameters(result),
@@ -56,12 +58,13 @@ def sections(result: FitData) -> list[Section]:
         *contact_sections(result),
         shot_motions(result),
         *stiffness_fields(result),
+        *inputs_over_time(result),
         _unknown(result),
         _correlations(result),
         lopsided_profiles(result),
         bootstrap(result),
         groups_of_starts(result),
-        _course(result),
+        _course(whole),
         Section("Warnings", notes=tuple(("", warning) for warning in result.warnings)),
     ]
     return [part for part in parts if part.rows or part.notes]

@@ -19,7 +19,10 @@ def stiffness_fields(result: FitData) -> list[Section]:
     rows = [_row(field) for field in result.fields]
     headers = ("field", "places", "E from", "to", "unit", "size", "95 %", "length", "95 %", "unit")
     notes = [
-        ("E", "the stiffness of a cluster of a solid, or of a triangle of a cloth along the warp"),
+        (
+            "E",
+            "the stiffness of a cluster of a solid, of a triangle of a cloth along the warp, or EI of a rope's joint",
+        ),
         ("size", "rms of ln E about its mean that the prior expects; length: over which neighbors are alike"),
         ("95 %", "interval of what was found from the recordings; open: they do not determine it"),
     ]
@@ -27,7 +30,8 @@ def stiffness_fields(result: FitData) -> list[Section]:
     if few:
         told = ", ".join(f"{name} ({100 * left:.0f} %)" for name, left in few.items())
         why = f"the data leave less than {100 * UNSEEN:.0f} % of the prior's variance in the finest modes"
-        then = "They also show modes that are finer still, which change the estimates. Give more stiffness_modes"
+        then = "They also show modes that are finer still, which change the estimates. "
+        then += "Give more stiffness_modes, or softness_modes of a rope"
         notes.append(("too few modes", f"{told}: {why}. {then}"))
     return [Section("Stiffness fields", headers, tuple(rows), tuple(notes)), *map(_places, result.fields)]
 
@@ -40,14 +44,15 @@ def _row(f: FieldFit) -> tuple[str, ...]:
         short(max(f.stiffness), 3),
         f.unit,
         short(f.size, 2),
-        _interval(f.size_lower, f.size_upper, 1.0),
+        interval(f.size_lower, f.size_upper, 1.0),
         short(1e3 * f.length, 2),
-        _interval(f.length_lower, f.length_upper, 1e3),
+        interval(f.length_lower, f.length_upper, 1e3),
         "mm",
     )
 
 
-def _interval(lower: float | None, upper: float | None, factor: float) -> str:
+def interval(lower: float | None, upper: float | None, factor: float) -> str:
+    """The ends of what was found, in words."""
     if lower is None:
         return "given"
     if upper is None:
@@ -67,7 +72,7 @@ def _places(f: FieldFit) -> Section:
     rows = [
         (
             str(c),
-            " ".join(f"{1e3 * x:.3g}" for x in center),
+            " ".join(f"{1e3 * x:.3g}" for x in (center[:1] if f.place == "joint" else center)),
             short(E, 3),
             f"{100 * math.expm1(min(half, 50.0)):.2g} %",
             f"{100 * left:.2g} %",
@@ -77,5 +82,5 @@ def _places(f: FieldFit) -> Section:
         )
     ]
     more = [("not listed", f"{len(f.left) - LISTED} {f.place}s; fit.json has all")] if len(f.left) > LISTED else []
-    headers = (f.place, "center (mm)", f"E ({f.unit})", "+/-", "left")
+    headers = (f.place, "along it (mm)" if f.place == "joint" else "center (mm)", f"E ({f.unit})", "+/-", "left")
     return Section(f"Stiffness of the {f.place}s: {f.name}", headers, tuple(rows), (("left", note), *more))

@@ -10,7 +10,8 @@ UNSEEN = 0.75  # likewise, of the finest modes: where the data leave less, they 
 
 @dataclass(frozen=True, kw_only=True)
 class FieldFit:
-    """A field of stiffness with a smoothness prior, over the clusters of a solid or the triangles of a cloth.
+    """A field of stiffness with a smoothness prior: over the clusters of a solid, the triangles of a cloth, or the
+    joints of a rope or rod.
 
     Attributes:
         name: of the field, such as "toy_stiffness".
@@ -18,7 +19,7 @@ class FieldFit:
         size_lower, size_upper: of its 95 % interval, 0 and None at open ends; both None where the size was given.
         length: m, over which neighbors are alike.
         length_lower, length_upper: likewise.
-        centers: m, of the places at rest.
+        centers: m, of the places at rest; of a rope the arc length, 0 and 0.
         stiffness: of each place, in `unit`.
         half_widths: of ln E of each place, 95 %, with the prior. They count the uncertainty of a size and a length that
             were found, and what the prior expects of modes finer than those that are fitted.

@@ -12,6 +12,7 @@ from .bootstrap import Bootstrap
 from .estimate import UNSOUND, Correlation, Estimate, Given, Premise, ProfileCurve, estimate_of
 from .field import FieldFit
 from .motions import ContactFit, ForceFit, Kinks, MotionGrowth, RecordingFit
+from .over_time import OverTimeFit
 from .shot import ShotMotion
 
 
@@ -109,6 +110,7 @@ class FitData:
         bootstrap: intervals from data drawn at random, where they were asked for.
         shot: of every motion that was shot in windows, what its model loses.
         fields: of every stiffness field with a smoothness prior, the prior and the stiffness of each cluster.
+        over_time: of every unknown force or wind over time, in each recording, its values and their intervals.
         assumed: how the ends of ropes are held and what that assumes, in words, where a configuration says it.
     """
 
@@ -149,6 +151,7 @@ class FitData:
     profiles: tuple[ProfileCurve, ...] = ()
     shot: tuple[ShotMotion, ...] = ()
     fields: tuple[FieldFit, ...] = ()
+    over_time: tuple[OverTimeFit, ...] = ()
     bootstrap: Bootstrap | None = None
 
     def __getitem__(self, name: str) -> Estimate:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -63,6 +66,38 @@ class Air:
         if not len(self.times):
             self.times, self.wind = np.zeros(1), np.zeros((1, 3))
         self._append(corners, {"pressure": p})
+
+    def vary(self, scene: Builder, times: Array) -> None:
+        """Take knots (knots,) s at which a wind that is constant so far may change.
+
+        Raises:
+            SceneError: it changes already.
+        """
+        if self._blowing is None:
+            self._blow(scene, None, None)
+        if len(self.times) > 1:
+            fix = "give a constant wind, or none; of a wind that is given over time the quantities are the unknowns"
+            raise SceneError("wind", "changes over given times already", len(self.times), fix)
+        knots = 3 * np.arange(len(times))
+        for i, t in enumerate(scene.terms):
+            if t.array == "wind":
+                scene.terms[i] = replace(t, index=np.ravel(t.index) + knots)
+        self.times, self.wind = times, np.zeros((len(times), 3))
+
+    def blow_in(self, scene: Builder, shapes: Array, names: Sequence[Sequence[str]]) -> None:
+        """Add to the wind quantities, three for each mode, times its shape (knots, modes) over the knots.
+
+        Args:
+            names: by mode and axis.
+        """
+        knots = 3 * np.arange(len(self.times))
+        scene.add_terms(
+            [
+                Term("wind", knots + axis, shape, ((name, "identity"),))
+                for shape, own in zip(shapes.T, names, strict=True)
+                for axis, name in enumerate(own)
+            ]
+        )
 
     def arrays(self) -> dict[str, Array]:
         """The plain parts of the input arrays."""

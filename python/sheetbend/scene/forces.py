@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_increasing, finite
 from ..errors import SceneError
-from ..quantities.expression import Factors, by_factors
+from ..quantities.expression import Expression, Factors, by_factors
 from ..quantities.quantities import Term
 
 Array = np.ndarray
@@ -26,6 +28,11 @@ def spread_over(forces: ArrayLike, shape: tuple[int, ...]) -> Array:
         raise SceneError("add_force.forces", "has the wrong shape", given.shape, f"give {shape}") from error
 
 
+def at_times(knots: Array, times: Array) -> Array:
+    """(times, knots) weights of knots in what is linear between them and constant outside."""
+    return np.stack([np.interp(times, knots, one) for one in np.eye(len(knots))], axis=1)
+
+
 class Forces:
     """The forces of a scene, at one set of knots.
 
@@ -39,6 +46,7 @@ class Forces:
         self.times: Array = np.zeros(0)
         self._values: list[Array] = []
         self._terms: list[tuple[int, int, int, float, Factors]] = []
+        self._varied: list[tuple[list[int], Array, Array, tuple[str, str, str], Factors]] = []
 
     def add(self, particles: Array, forces: ArrayLike, times: ArrayLike) -> None:
         """See `Scene.add_force`."""
@@ -70,6 +78,51 @@ class Forces:
         """Add a quantity to a force along an axis at a knot."""
         self._terms.append((particle, knot, axis, 1.0, ((quantity, "identity"),)))
 
+    def vary(
+        self,
+        particles: list[int],
+        weights: Sequence[Expression],
+        times: Array,
+        shapes: Array,
+        names: Sequence[Sequence[str]],
+    ) -> None:
+        """Add a force over time in modes: quantities, three for each mode, times its shape over the knots.
+
+        Args:
+            particles: that it acts on, which may be loaded already.
+            weights: of the force on each.
+            times: (knots,) s. Forces that were added before go on as they were: all take the knots of both.
+            shapes: (knots, modes).
+            names: by mode and axis.
+        """
+        every = np.union1d(self.times, times)
+        if self.particles:
+            self._move_to(every)
+        self.times = every
+        new = [p for p in particles if p not in self.particles]
+        self.particles += new
+        self._values += [np.zeros((len(every), 3)) for _ in new]
+        at_knots = at_times(times, every) @ shapes
+        parts: dict[Factors, list[tuple[int, float]]] = {}
+        for particle, weight in zip(particles, weights, strict=True):
+            for factors, share in weight.parts.items():
+                parts.setdefault(factors, []).append((particle, share))
+        for factors, own in parts.items():
+            nodes, by = [p for p, _ in own], np.array([share for _, share in own])
+            for shape, (x, y, z) in zip(at_knots.T, names, strict=True):
+                self._varied.append((nodes, by, shape, (x, y, z), factors))
+
+    def _move_to(self, times: Array) -> None:
+        """Take other knots (knots,), among which are all of those before."""
+        by = at_times(self.times, times)
+        self._values = [by @ f for f in self._values]
+        self._terms = [
+            (p, int(knot), axis, share * float(by[knot, before]), factors)
+            for p, before, axis, share, factors in self._terms
+            for knot in np.flatnonzero(by[:, before])
+        ]
+        self._varied = [(nodes, share, by @ shape, *more) for nodes, share, shape, *more in self._varied]
+
     def _checked(self, times: ArrayLike) -> Array:
         t = finite("add_force.times", times, None, SceneError).ravel()
         check_increasing("add_force.times", t)
@@ -81,10 +134,22 @@ class Forces:
     def terms(self) -> list[Term]:
         """Their places are known once every loaded particle is."""
         slot, loads = {p: k for k, p in enumerate(self.particles)}, len(self.particles)
-        return [
+        given = [
             Term("force", 3 * (knot * loads + slot[p]) + axis, share, factors)
             for p, knot, axis, share, factors in self._terms
         ]
+        knots = loads * np.arange(len(self.times))[:, None]
+        varied = [
+            Term(
+                "force",
+                (3 * (knots + [slot[p] for p in nodes]) + axis).ravel(),
+                np.outer(shape, share).ravel(),
+                (*factors, (name, "identity")),
+            )
+            for nodes, share, shape, names, factors in self._varied
+            for axis, name in enumerate(names)
+        ]
+        return [*given, *varied]
 
     @property
     def values(self) -> Array:

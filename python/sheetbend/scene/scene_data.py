@@ -65,6 +65,7 @@ class SceneData:
         self.cloths: dict[str, Any] = {}
         self.solids: dict[str, Any] = {}
         self.bodies: dict[str, Body] = {}
+        self.over_time: dict[str, Any] = {}  # unknown inputs
         self.rotors: dict[str, list[int | None]] = {}  # five nodes by joint, of which the second turns
         self._particles, self._hidden = Rows(), Rows()
         self._frozen = False

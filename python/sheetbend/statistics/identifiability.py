@@ -8,7 +8,7 @@ parameters costs little more.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -63,6 +63,7 @@ def identify(
     limits: Mapping[str, str] | None = None,
     fixes: Mapping[tuple[str, str], str] | None = None,
     bodies: Sequence[BodyNumbers] = (),
+    linear_ones: Container[str] = (),
     rank_tolerance: float = RANK_TOLERANCE,
 ) -> Identifiability:
     """Judge every free parameter of a finished fit.
@@ -85,6 +86,7 @@ def identify(
         fixes: what to change where a parameter stops at a bound that is no user's, by parameter and side ("lower",
             "upper").
         bodies: rigid bodies of which numbers are fitted.
+        linear_ones: parameters whose profiles are not asked for.
         rank_tolerance: see `gauge.RANK_TOLERANCE`.
 
     Raises:
@@ -103,7 +105,8 @@ def identify(
         judge.linear(column, (discretization.get(name, 0.0), systematic.get(name, 0.0)))
         for column, name in enumerate(parameters.free)
     ]
-    wanted = [w for part in linear if isinstance(part, Linear) and (w := judge.wanted(part)) is not None]
+    asked = (p for p in linear if isinstance(p, Linear) and p.parameter.name not in linear_ones)
+    wanted = [w for part in asked if (w := judge.wanted(part)) is not None]
     found = {} if profiler is None or not wanted else dict(zip((w.name for w in wanted), profiler(wanted), strict=True))
     estimates = tuple(
         judge.concluded(part, floors.get(part.parameter.name), found.get(part.parameter.name))
