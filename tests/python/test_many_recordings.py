@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import pickle
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
@@ -16,9 +17,10 @@ import sheetbend as sb
 from pytest import approx
 from sheetbend.errors import InputError
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum import blocks
+from sheetbend.minimum import recordings
 from sheetbend.minimum.approach import inside
 from sheetbend.minimum.blocks import ManyProblem
+from sheetbend.minimum.journal import Journal
 from sheetbend.minimum.problem import FitProblem
 from test_workers import Backwards
 
@@ -112,7 +114,7 @@ def test_recordings_that_differ_widen_the_interval() -> None:
 def test_the_bits_do_not_depend_on_the_workers(executor: Executor, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nor on how many problems a process keeps."""
     alone = fitted()
-    monkeypatch.setattr(blocks, "KEPT", 3)
+    monkeypatch.setattr(recordings, "KEPT", 3)
     shared = sb.fit_many(swings(), WANTED, executor=executor)
     executor.shutdown(wait=False)
     took = {"seconds": 0.0}
@@ -126,9 +128,50 @@ def test_it_tells_and_saves_all_recordings(tmp_path: Path) -> None:
     assert all(len(line) <= 120 for line in text.splitlines())
     found.save(tmp_path / "many.json")
     data = json.loads((tmp_path / "many.json").read_text())
-    assert data["cost"] == found.cost and data["own"][0]["values"] == list(found.own[0].values)
+    assert data["cost"] == found.cost and data["recordings"] == COUNT and data["table"] == "many.csv"
+    assert data["own"][0]["values"]["50 %"] == np.median(found.own[0].values)
     rows = list(csv.reader((tmp_path / "many.csv").open()))
     assert len(rows) == COUNT + 1 and rows[1][0] == "swing 0" and float(rows[1][2]) == found.own[0].values[0]
+    assert sb.ManyFit.load(tmp_path / "many.json") == found
+    (tmp_path / "many.csv").write_text("\n".join(",".join(row) for row in rows[:-1]))
+    with pytest.raises(InputError, match=r"many.csv: is not the table of many.json"):
+        sb.ManyFit.load(tmp_path / "many.json")
+
+
+def test_a_fit_that_was_interrupted_goes_on_with_the_same_bits(tmp_path: Path) -> None:
+    """Ctrl-C within the second step; what was evaluated before is read."""
+
+    def stop(progress: Any) -> None:
+        raise KeyboardInterrupt
+
+    path, took = tmp_path / "many.sqlite", {"seconds": 0.0}
+    first = sb.fit_many(swings(), WANTED, progress=stop, journal=path)
+    assert first.interrupted and not first.converged and first.iterations == 1 and path.exists()
+    ahead: list[int] = []
+    with Journal(path) as journal:
+        assert len(journal) >= 3
+        again = sb.fit_many(swings(), WANTED, progress=lambda p: ahead.append(journal.made))
+        assert journal.read >= 3 and ahead[0] == 0
+    other = [replace(e, sigma=2e-3) if k == 4 else e for k, e in enumerate(swings())]
+    with pytest.raises(InputError, match="different are experiment 'swing 4'"):
+        sb.fit_many(other, WANTED, journal=path)
+    found = sb.fit_many(swings(), WANTED, journal=path)
+    assert repr(replace(found, **took)) == repr(replace(again, **took)) == repr(replace(fitted(), **took))
+    assert not path.exists()
+
+
+def test_recordings_on_equal_scenes_share_one() -> None:
+    """Also where one was compiled before; scenes with other numbers stay apart."""
+    many = ManyProblem([*swings()[:3], *stiffer()], as_parameters(WANTED, swings()[:3]))
+    scenes = [e.scene for e in many.experiments]
+    assert scenes[0] is scenes[1] is scenes[2] is swings()[0].scene and scenes[3] is not scenes[0]
+    assert all(e.recording is own.recording for e, own in zip(many.experiments[:3], swings()[:3], strict=True))
+    packed = len(pickle.dumps(many._common.value))
+    assert packed < 0.75 * len(pickle.dumps(swings()[:3] + stiffer()))
+
+
+def stiffer() -> tuple[sb.Experiment, ...]:
+    return (replace(swings()[0], scene=rope(EI=2e-3), name="stiffer"),)
 
 
 def test_what_does_not_go_is_refused() -> None:

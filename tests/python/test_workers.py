@@ -140,3 +140,29 @@ def test_processes_answer_in_order_and_one_that_dies_is_an_error() -> None:
         assert Common(2).map(_doubled, [3, 1, 2]) == [6, 2, 4]
         with pytest.raises(sb.SheetbendError, match="a worker ended"):
             Common(2).map(_killed, [1])
+
+
+def _counted(common: bytes, item: int) -> int:
+    if item < 0:
+        raise ValueError(item)
+    return len(common) + item
+
+
+def test_a_large_common_part_is_not_sent_with_every_item() -> None:
+    large, executor = bytes(10_000_000), Backwards()
+    with working_on(executor):
+        common = Common(large)
+        assert common.map(_counted, range(40)) == [len(large) + k for k in range(40)]
+        assert sum(size > len(large) for size in executor.bytes) <= 3
+        assert common.map(_counted, [1, 2]) == [len(large) + 1, len(large) + 2]
+    with ThreadPoolExecutor(2) as threads, working_on(threads), pytest.raises(ValueError, match="-1"):
+        Common(large).map(_counted, [3, -1, *range(9), -2])
+
+
+def test_workers_that_come_later_get_the_common_part() -> None:
+    """Each thread is a worker of its own; those of a second executor have nothing yet."""
+    large = bytes(3_000_000)
+    common = Common(large)
+    for threads in (1, 4):
+        with ThreadPoolExecutor(threads) as executor, working_on(executor):
+            assert common.map(_counted, range(60)) == [len(large) + k for k in range(60)]

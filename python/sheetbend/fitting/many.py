@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
+from pathlib import Path
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from ..experiment.experiment import Experiment
 from ..experiment.wanted import ParameterLike, as_parameters
 from ..minimum.blocks import Arrow, ManyApproach, ManyProblem, reduced
 from ..minimum.counts import counted
+from ..minimum.journal import journaled
 from ..minimum.linear_algebra import one_blas_thread
 from ..minimum.progress import Progress
 from ..minimum.workers import shared_out
@@ -33,6 +35,7 @@ RESTS = 1e-6  # of a parameter's size: so near a bound it rests there
 
 
 @shared_out
+@journaled
 @one_blas_thread()
 def fit_many(
     experiments: Sequence[Experiment],
@@ -40,6 +43,7 @@ def fit_many(
     *,
     max_iterations: int = 100,
     progress: Callable[[Progress], None] | None = None,
+    journal: str | Path | None = None,
     executor: Executor | None = None,
 ) -> ManyFit:
     """Fit shared parameters, and private ones of every recording, to many recordings.
@@ -59,8 +63,10 @@ def fit_many(
         parameters: as `sheetbend.fit` takes them.
         max_iterations: largest number of steps.
         progress: function that is called after every step.
+        journal: a file that keeps every evaluation. A fit that was killed or interrupted is called again with the same
+            journal: it goes on, and ends with the same bits. The file is removed at the end.
         executor: its workers divide the recordings among themselves; the result has the same bits. Each worker holds
-            all recordings.
+            all recordings, with one scene for all whose scenes have the same content.
 
     Returns:
         ManyFit: the shared parameters with intervals, the private ones as a distribution, and a row for each recording.
@@ -93,21 +99,21 @@ def fit_many(
                 progress(Progress(walk.iterations, walk.cost, walk.u.copy()))
     except KeyboardInterrupt:
         interrupted = True
-    _, _, arrow = problem.evaluate(walk.u)
-    squares, rows = problem.misfits(walk.u)
-    estimates, scatter, spread = _shared(problem, walk.u, arrow, squares, rows)
+    arrow, told = walk.arrow, problem.told(walk.u)
+    estimates, scatter, spread = _shared(problem, walk.u, arrow, told.squares, told.rows)
     made = counted()
     return ManyFit(
         estimates=estimates,
         scatter=scatter,
-        own=_own(problem, wanted, walk.u, arrow, spread),
+        own=_own(problem, wanted, walk.u, arrow, told.covariances, spread),
         recordings=tuple(e.name for e in every),
-        misfit=tuple(float(x) for x in np.sqrt(squares / rows)),
+        misfit=tuple(float(x) for x in np.sqrt(told.squares / told.rows)),
         cost=walk.cost,
         first_cost=first,
-        rows=int(rows.sum()),
+        rows=int(told.rows.sum()),
         iterations=walk.iterations,
         converged=not interrupted and walk.promised < walk.least,
+        interrupted=interrupted,
         seconds=time.perf_counter() - began,
         evaluations=made[0] - before[0],
         jacobians=made[1] - before[1],
@@ -173,14 +179,16 @@ def _estimate(
     return closed_estimate(parameter, value, lower, upper)
 
 
-def _own(problem: ManyProblem, wanted: Parameters, u: Array, arrow: Arrow, spread: Array) -> tuple[OwnParameter, ...]:
+def _own(
+    problem: ManyProblem, wanted: Parameters, u: Array, arrow: Arrow, known: Sequence[Array], spread: Array
+) -> tuple[OwnParameter, ...]:
     """The values and standard deviations of each private parameter in all recordings; those of logarithms on a log
     scale."""
     names = [name for name in wanted.free if wanted[name].private]
     place = {name: k for k, name in enumerate(problem.parameters.free)}
     values = np.full((len(names), len(arrow.own)), np.nan)
     sds = np.full((len(names), len(arrow.own)), np.nan)
-    for i, (e, known_shared) in enumerate(zip(problem.experiments, problem.own_covariances(u), strict=True)):
+    for i, (e, known_shared) in enumerate(zip(problem.experiments, known, strict=True)):
         part = reduced(*arrow.parts(i))
         along = np.linalg.lstsq(part.own, part.cross, rcond=RANK_TOLERANCE)[0]
         variances = np.diag(known_shared) + np.diag(along @ spread @ along.T)

@@ -10,32 +10,32 @@ depend on who made them.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..arrays.timeseries import Array
-from ..errors import InputError
+from ..errors import InputError, SheetbendError
 from ..experiment.experiment import Experiment
 from ..quantities.parameters import Parameters
-from ..statistics.covariance import covariance
-from ..statistics.gauge import RANK_TOLERANCE, null_space
+from ..statistics.gauge import RANK_TOLERANCE
 from .approach import RIDGE, Approach, inside
 from .coordinates import Coordinates
 from .counts import count
+from .journal import Evaluation, current
 from .parts import expanded_to
-from .problem import FitProblem
-from .triangle import triangle
+from .recordings import Item, Recordings, norms, sharing_scenes, told, triangles
+from .triangle import padded
 from .workers import Common
 
 CHUNK = 16  # recordings in a piece of work
-KEPT = 2000  # recordings whose problems a process keeps: some 0.1 MB each, and making one takes 1 ms
 PASSES = 8  # of a step, each holding own numbers at the sides that they have met
 SMALL = 1e-4  # of the cost of one row: what a step must promise
 
-Item = tuple[range, Array, Array, bool]  # which recordings, their own numbers, the shared ones, whether with a Jacobian
+Work = Callable[[Recordings, Item], Array | str]
 
 
 @dataclass(frozen=True)
@@ -60,17 +60,8 @@ class Reduced:
 def reduced(own: Array, shared: Array, r: Array) -> Reduced:
     """From columns (rows, q) and (rows, shared) and residuals (rows,)."""
     q, s = own.shape[1], shared.shape[1]
-    T = _padded(np.column_stack([own, shared, r]))
+    T = padded(np.column_stack([own, shared, r]))
     return Reduced(T[:q, :q], T[:q, q : q + s], T[:q, -1], T[q:, q : q + s], T[q:, -1])
-
-
-def _padded(rows: Array) -> Array:
-    """(n, n) triangle of rows (any, n), zero where there are fewer."""
-    n = rows.shape[1]
-    T = np.zeros((n, n))
-    R = triangle(rows)
-    T[: len(R)] = R
-    return T
 
 
 class Arrow:
@@ -142,11 +133,26 @@ class Arrow:
         return reduced(np.vstack([moved, weak]), np.vstack([shared, below]), np.append(known, np.zeros(len(weak))))
 
 
+class Told(NamedTuple):
+    """What is told of each recording.
+
+    Attributes:
+        squares: (recordings,) sums of squared residuals, priors left out.
+        rows: (recordings,) their numbers.
+        covariances: (q, q) of each recording's own numbers, the shared ones known; NaN where its data do not determine
+            them.
+    """
+
+    squares: Array
+    rows: Array
+    covariances: Sequence[Array]
+
+
 class ManyProblem:
     """Many recordings with shared and own parameters.
 
     Attributes:
-        experiments: in order.
+        experiments: in order; those whose scenes have the same content share one.
         parameters: own ones expanded to one for each recording that has them.
         coordinates: those of the parameters.
         own: columns of the own parameters, of each recording.
@@ -163,10 +169,9 @@ class ManyProblem:
             InputError: recordings share a name, correct the markers that their scenes follow, estimate their starts,
                 or are shot in windows.
         """
-        self.experiments, self.failure = tuple(experiments), ""
-        names = [e.name for e in experiments]
+        names, self.failure = [e.name for e in experiments], ""
         if len(set(names)) < len(names):
-            twice = next(name for name in names if names.count(name) > 1)
+            twice = next(name for name, count in Counter(names).items() if count > 1)
             raise InputError("experiments", "share a name", twice, "give each a name of its own")
         corrected = [e.name for e in experiments if e.driven_noise is not None]
         if corrected:
@@ -177,6 +182,7 @@ class ManyProblem:
             raise InputError("shooting", "does not go with many recordings", in_windows[:5], "use sheetbend.fit")
         if over_time := [e.name for e in experiments if e.scene.over_time]:
             raise InputError("scene", "has unknown inputs over time", over_time[:5], "use sheetbend.fit")
+        self.experiments = sharing_scenes(experiments)
         self.parameters = expanded_to(parameters, self.experiments)
         self.coordinates = Coordinates(self.parameters)
         place = {name: column for column, name in enumerate(self.parameters.free)}
@@ -186,37 +192,57 @@ class ManyProblem:
         self.own = [
             np.array([place[n] for k in kinds if (n := f"{k}[{e.name}]") in place], dtype=int) for e in experiments
         ]
-        self._common = Common(_Recordings(self.experiments, parameters, tuple(every)))
+        self._common = Common(Recordings(self.experiments, parameters, tuple(every)))
+        self._journal, self._key = current(), b""
 
-    def _map(self, work: Callable[[_Recordings, Item], Any], u: Array, jacobian: bool) -> list[Any]:
-        total = len(self.experiments)
-        chunks = [range(k, min(k + CHUNK, total)) for k in range(0, total, CHUNK)]
-        items = [(c, np.concatenate([u[self.own[i]] for i in c]), u[self.shared], jacobian) for c in chunks]
-        return self._common.map(work, items)
+    def _flat(self, work: Work, u: Array) -> tuple[bool, Array]:
+        """What a piece of work makes of all recordings at u, one after the other, through the journal where one is
+        open; not ok, with `failure`, where the physics of one has no answer."""
+
+        def made() -> Evaluation:
+            total, nothing = len(self.experiments), np.zeros((0, 0))
+            chunks = [range(k, min(k + CHUNK, total)) for k in range(0, total, CHUNK)]
+            items = [(c, np.concatenate([u[self.own[i]] for i in c]), u[self.shared]) for c in chunks]
+            parts = self._common.map(work, items)
+            lost = [part for part in parts if isinstance(part, str)]
+            self.failure = lost[0] if lost else ""
+            return not lost, np.concatenate([part for part in parts if not isinstance(part, str)] or [u[:0]]), nothing
+
+        if self._journal is None:
+            return made()[:2]
+        if not self._key:
+            self._key = self._journal.problem(self._common.value.digests())
+        key = self._key + work.__name__.encode()
+        return self._journal.evaluate(key, u, False, made)[0][:2]
 
     def evaluate(self, u: Array, jacobian: bool = True) -> tuple[bool, Array, Any]:
         """(ok, residuals, `Arrow` or None) at u (free,). The residuals are as `Arrow.residuals` has them; without a
         Jacobian they are one for each recording, of the same sum of squares."""
-        found = [part for chunk in self._map(_evaluated, u, jacobian) for part in chunk]
+        ok, found = self._flat(triangles if jacobian else norms, u)
         count(1, int(jacobian))
-        lost = [part for part in found if isinstance(part, str)]
-        if lost:
-            self.failure = lost[0]
+        if not ok:
             return False, np.zeros(0), None
         prior = self._prior(u)
         if not jacobian:
-            return True, np.append(np.array(found, dtype=float), prior[1]), None
-        arrow = Arrow(found, self.own, self.shared, prior)
+            return True, np.append(found, prior[1]), None
+        sizes = np.array([len(own) + len(self.shared) + 1 for own in self.own])
+        parts = np.split(found, np.cumsum(sizes**2)[:-1])
+        arrow = Arrow([T.reshape(n, n) for T, n in zip(parts, sizes, strict=True)], self.own, self.shared, prior)
         return True, arrow.residuals, arrow
 
-    def own_covariances(self, u: Array) -> list[Array]:
-        """(q, q) of each recording's own numbers, the shared ones known; NaN where its data do not determine them."""
-        return [part for chunk in self._map(_own_covariances, u, True) for part in chunk]
+    def told(self, u: Array) -> Told:
+        """What is told of each recording at u (free,).
 
-    def misfits(self, u: Array) -> tuple[Array, Array]:
-        """(recordings,) sums of squared residuals, priors left out, and their numbers."""
-        found = [part for chunk in self._map(_misfits, u, False) for part in chunk]
-        return np.array([part[0] for part in found]), np.array([part[1] for part in found])
+        Raises:
+            SheetbendError: the physics of one has no answer.
+        """
+        ok, found = self._flat(told, u)
+        if not ok:
+            raise SheetbendError(f"nothing is known at the end: {self.failure}")
+        sizes = np.array([len(own) for own in self.own])
+        parts = np.split(found, np.cumsum(sizes**2 + 2)[:-1])
+        covariances = [part[2:].reshape(q, q) for part, q in zip(parts, sizes, strict=True)]
+        return Told(np.array([part[0] for part in parts]), np.array([part[1] for part in parts]), covariances)
 
     def _prior(self, u: Array) -> tuple[Array, Array]:
         names = [self.parameters.free[column] for column in self.shared]
@@ -228,80 +254,6 @@ class ManyProblem:
         return rows, r
 
 
-class _Recordings:
-    """What a worker has of the recordings: problems of one recording each, once they are made. The first `KEPT` stay,
-    and others are made again for every evaluation, so that memory is bounded; the bits are the same."""
-
-    def __init__(self, experiments: tuple[Experiment, ...], parameters: Parameters, shared: tuple[str, ...]) -> None:
-        self.experiments, self.parameters, self.shared = experiments, parameters, shared
-        self._made: dict[int, FitProblem] = {}
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _Recordings, (self.experiments, self.parameters, self.shared)
-
-    def each(self, item: Item) -> list[tuple[FitProblem, Array, Array, Array]]:
-        """Of each recording of an item: problem, point, own columns, shared columns."""
-        which, own, shared, _ = item
-        known, found, begun = dict(zip(self.shared, shared, strict=True)), [], 0
-        for i in which:
-            problem = self._made.get(i) or FitProblem([self.experiments[i]], self.parameters)
-            if len(self._made) < KEPT:
-                self._made[i] = problem
-            free = problem.parameters.free
-            mine = np.array([k for k, name in enumerate(free) if name not in known], dtype=int)
-            u = np.array([known.get(name, math.nan) for name in free])
-            u[mine] = own[begun : begun + len(mine)]
-            begun += len(mine)
-            found.append((problem, u, mine, np.array([free.index(name) for name in self.shared], dtype=int)))
-        return found
-
-
-def _rows(problem: FitProblem, u: Array, own: Array, jacobian: bool) -> tuple[Array, Array] | str:
-    """Residuals of one recording and of its own numbers' priors, and their Jacobian; in words why there are none."""
-    ok, r, J = problem.core.evaluate(u, jacobian)
-    if not ok or not np.isfinite(r).all() or not np.isfinite(J).all():
-        return f"{problem.experiments[0].name}: {problem.failure}"
-    data, prior = problem.core.data_rows, problem.parameters.prior_jacobian()
-    mine = prior[:, own].any(axis=1) if len(prior) else np.zeros(0, dtype=bool)
-    r = np.append(r[:data], problem.parameters.prior_residuals(u)[mine])
-    return r, np.vstack([J[:data], prior[mine]]) if jacobian else J
-
-
-def _evaluated(recordings: _Recordings, item: Item) -> list[Array | float | str]:
-    found: list[Array | float | str] = []
-    for problem, u, own, shared in recordings.each(item):
-        made = _rows(problem, u, own, item[3])
-        if isinstance(made, str):
-            return [made]
-        r, J = made
-        found.append(_padded(np.column_stack([J[:, own], J[:, shared], r])) if item[3] else float(np.sqrt(r @ r)))
-    return found
-
-
-def _own_covariances(recordings: _Recordings, item: Item) -> list[Array]:
-    found = []
-    for problem, u, own, _ in recordings.each(item):
-        made, unknown = _rows(problem, u, own, True), np.full((len(own), len(own)), np.nan)
-        if isinstance(made, str) or not len(own):
-            found.append(unknown)
-            continue
-        (r, J), data = made, problem.core.data_rows
-        names = [problem.parameters.free[k] for k in own]
-        seen = null_space(J[:, own], names, [problem.parameters[n].log for n in names], RANK_TOLERANCE).determined
-        whole = len(seen) == len(own) and data > len(own)
-        layout = problem.rows_layout()
-        found.append(covariance(r[:data], J[:data, own], layout, J[data:, own]).matrix if whole else unknown)
-    return found
-
-
-def _misfits(recordings: _Recordings, item: Item) -> list[tuple[float, int]]:
-    found = []
-    for problem, u, own, _ in recordings.each(item):
-        made, data = _rows(problem, u, own, False), problem.core.data_rows
-        found.append((math.nan, data) if isinstance(made, str) else (float(made[0][:data] @ made[0][:data]), data))
-    return found
-
-
 class ManyApproach(Approach):
     """The same walk with steps from triangles: a recording's own numbers keep their places as long as moving them
     promises next to nothing of its own cost."""
@@ -311,6 +263,14 @@ class ManyApproach(Approach):
     def __init__(self, problem: ManyProblem, u: Array) -> None:
         self._own = problem.own
         super().__init__(problem, u)
+
+    @property
+    def arrow(self) -> Arrow:
+        """Where it is."""
+        if self._J is None:
+            _, self._r, self._J = self._evaluated(self.u, True)
+        assert self._J is not None  # where it is, the physics has an answer
+        return self._J
 
     @property
     def least(self) -> float:

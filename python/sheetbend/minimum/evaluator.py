@@ -39,6 +39,10 @@ class Evaluator:
         self._made_from: Callable[[], Mapping[str, str]] | None = None if self._journal is None else made_from
         self._key = b""
 
+    def digests(self) -> Mapping[str, str]:
+        """Of what the problem is made from; none where no journal was open, or once it has the problem."""
+        return {} if self._made_from is None else self._made_from()
+
     def __call__(self, u: np.ndarray, jacobian: bool) -> Timed:
         """(ok, residuals, Jacobian), and the seconds that it took when it was made, where they are known."""
         if self._journal is None:

@@ -35,6 +35,7 @@ COMMIT_SECONDS = 0.1  # at least, between commits: what a kill may cost besides 
 SHARE, GRACE = 0.02, 0.05  # of the time of evaluations, and s, that writing may take; what is beyond is made again
 LARGEST_JACOBIAN = 64e6  # bytes; a larger one is made again
 ROOM = 1e9  # bytes, of all values; when it is full no more Jacobians are kept, and no more residuals at twice as much
+NAMED = 10  # of what differs from what a journal was begun with
 RESERVE = 30e6  # bytes of the disk that are left to the results
 TABLES = (
     "about (part TEXT, label TEXT, text TEXT NOT NULL, PRIMARY KEY (part, label))",
@@ -253,7 +254,9 @@ class Journal(AbstractContextManager["Journal"]):
             self._db.executemany("INSERT INTO about VALUES (?, ?, ?)", rows)
         differ = [label for label in {**had, **texts} if had and had.get(label) != texts.get(label)]
         if differ:
-            changes = [f"{label} ({had.get(label, 'none')} then, {texts.get(label, 'none')} now)" for label in differ]
+            changes = [f"{x} ({had.get(x, 'none')} then, {texts.get(x, 'none')} now)" for x in differ[:NAMED]]
+            if len(differ) > NAMED:
+                changes.append(f"and {len(differ) - NAMED} more")
             fix = "run it with what it was begun with, or begin anew without it"
             raise InputError("journal", f"is of another fit; different are {', '.join(changes)}", str(self.path), fix)
 

@@ -20,3 +20,12 @@ def triangle(A: Array) -> Array:
         return np.asarray(np.linalg.qr(A, mode="r"))
     blocks = np.asarray(np.linalg.qr(A[: whole * ROWS].reshape(whole, ROWS, n), mode="r"))
     return np.asarray(np.linalg.qr(np.concatenate([blocks.reshape(-1, n), A[whole * ROWS :]]), mode="r"))
+
+
+def padded(A: Array) -> Array:
+    """(n, n) triangle of A (rows, n), zero where it has fewer rows."""
+    n = A.shape[1]
+    T = np.zeros((n, n))
+    R = triangle(A)
+    T[: len(R)] = R
+    return T

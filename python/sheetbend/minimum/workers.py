@@ -27,6 +27,7 @@ from .linear_algebra import one_blas_thread
 from .traffic import Traffic
 
 KEPT = 8  # things that calls have in common, in each worker
+LITTLE = 64e6  # bytes of a common part, times items: what is sent at once, without asking who has it
 MACHINE = ("Python", "processor", "C library", "NumPy", "SciPy")  # which may change the last digits
 _current: ContextVar[tuple[Executor, Traffic] | None] = ContextVar("workers", default=None)
 
@@ -114,28 +115,43 @@ class Common(Generic[S]):
             return [work(self.value, item) for item in items]
         executor, traffic = found
         key, common = self.packed()
-        sent, self._sent = self._sent, True
-        futures: list[Future[Answer | None]] = []
         packed = [pickle.dumps(item, pickle.HIGHEST_PROTOCOL) for item in items]
-        began = time.process_time()
+        # A small common part goes with every item at first. A large one goes with one item, and with twice as many
+        # each time that workers which do not have it yet have answered the others.
+        carriers = 0 if self._sent else len(items) if len(common) * len(items) <= LITTLE else 1
+        left, answers, failed = list(range(len(items))), dict[int, T](), None
+        futures: list[tuple[int, Future[Answer | None]]] = []
+        self._sent, began = True, time.process_time()
         try:
-            with naming_losses():
-                futures += [executor.submit(_answer, work, key, None if sent else common, item) for item in packed]
-                traffic.sent += sum(map(len, packed)) + (0 if sent else len(common) * len(items))
-                answers = []
-                for item, future in zip(packed, futures, strict=True):
-                    answer = future.result()
-                    if answer is None:  # a worker that came later, or has kept other things since
-                        traffic.sent += len(common) + len(item)
-                        answer = executor.submit(_answer, work, key, common, item).result()
-                    assert answer is not None
+            while left:
+                with naming_losses():
+                    for k, i in enumerate(left):
+                        part = common if k < carriers else None
+                        futures.append((i, executor.submit(_answer, work, key, part, packed[i])))
+                        traffic.sent += len(packed[i]) + len(part or b"")
+                left = []
+                for i, future in futures:
+                    try:
+                        with naming_losses():
+                            answer = future.result()
+                    except Exception as error:
+                        failed = error  # once the items before it are done
+                        break
+                    if answer is None:
+                        left.append(i)
+                        continue
                     _compare(answer.unlike, traffic)
                     traffic.add(len(answer.packed), answer.seconds)
-                    answers.append(pickle.loads(answer.packed))  # which a worker of this client packed
-                return answers
+                    answers[i] = pickle.loads(answer.packed)  # which a worker of this client packed
+                for _, future in futures:
+                    future.cancel()
+                carriers, futures = max(1, 2 * carriers), []
+            if failed is not None:
+                raise failed
+            return [answers[i] for i in range(len(items))]
         finally:
             traffic.own += time.process_time() - began
-            for future in futures:
+            for _, future in futures:
                 future.cancel()
 
 

@@ -6,19 +6,24 @@ import csv
 import io
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
+from ..errors import InputError
+from ..files.door import ROOM, bounded_bytes, reading
+from ..files.json_file import json_content
+from ..files.typed import as_dataclass, as_type, mapping
 from ..files.whole import write_text
 from ..quantities.wording import short
 from ..result.estimate import Estimate, estimate_of
 from .tables import Section, plain_section
 
-FORMAT = "sheetbend many 1"
+FORMAT = "sheetbend many 2"
 SHARES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+LABELS = [f"{100 * share:g} %" for share in SHARES]
 FAR = 2.0  # times the median misfit: such recordings are named
 NAMED = 5
 
@@ -41,6 +46,17 @@ class OwnParameter:
 
 
 @dataclass(frozen=True)
+class _Distribution:
+    """An `OwnParameter` in the JSON of a fit: values below which shares of the recordings lie."""
+
+    name: str
+    unit: str
+    log: bool
+    values: Mapping[str, float] | None
+    sds: Mapping[str, float] | None
+
+
+@dataclass(frozen=True)
 class ManyFit:
     """A fit to many recordings.
 
@@ -56,6 +72,7 @@ class ManyFit:
         iterations, converged, seconds: how it went.
         evaluations, jacobians: how often all recordings were simulated, and how often of these with a Jacobian.
         jacobian_bytes: what was kept of one Jacobian.
+        interrupted: whether Ctrl-C ended it.
     """
 
     estimates: tuple[Estimate, ...]
@@ -72,6 +89,7 @@ class ManyFit:
     evaluations: int
     jacobians: int
     jacobian_bytes: int
+    interrupted: bool = False
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of a shared parameter; KeyError names the ones there are."""
@@ -85,21 +103,56 @@ class ManyFit:
         """A CSV row for each recording: its misfit, and value and standard deviation of its private parameters."""
         out = io.StringIO()
         writer = csv.writer(out, lineterminator="\n")
-        pairs = [(f"{p.name} [{p.unit}]" if p.unit else p.name, _sd_of(p)) for p in self.own]
-        writer.writerow(["recording", "misfit [sigma]", *(header for pair in pairs for header in pair)])
+        writer.writerow(_header(self.own))
         for i, name in enumerate(self.recordings):
             numbers = [x for p in self.own for x in (p.values[i], p.sds[i])]
             writer.writerow([name, repr(self.misfit[i]), *("" if math.isnan(x) else repr(x) for x in numbers)])
         return out.getvalue()
 
     def save(self, path: str | Path) -> None:
-        """Write all as JSON (numbers that are not known as null), whole or not at all; beside it, with the ending .csv,
-        `table`."""
-        data = {"format": FORMAT, **asdict(self)}
-        for one in data["own"]:
-            one |= {key: [None if math.isnan(x) else x for x in one[key]] for key in ("values", "sds")}
+        """Write the result as JSON, whole or not at all, with private parameters and misfits as distributions; beside
+        it, with the ending .csv, `table` with the numbers of every recording."""
+        path = Path(path)
+        data = {"format": FORMAT, "table": path.with_suffix(".csv").name, **self.__dict__}
+        data["estimates"] = [asdict(e) for e in self.estimates]
+        data["recordings"] = len(self.recordings)
+        data["misfit"] = dict(zip(LABELS, np.quantile(self.misfit, SHARES).tolist(), strict=True))
+        data["own"] = [
+            {"name": p.name, "unit": p.unit, "log": p.log, "values": _known(p.values), "sds": _known(p.sds)}
+            for p in self.own
+        ]
+        write_text(path.with_suffix(".csv"), self.table())
         write_text(path, json.dumps(data, indent=2, allow_nan=False) + "\n")
-        write_text(Path(path).with_suffix(".csv"), self.table())
+
+    @classmethod
+    def load(cls, path: str | Path) -> ManyFit:
+        """Read what `save` wrote, the table beside it included.
+
+        Raises:
+            InputError: the files hold no such fit, or do not belong together.
+        """
+        path = Path(path)
+        with reading(path, InputError):
+            data = dict(mapping(json_content(path, InputError, finite=True), str(path)))
+            if data.pop("format", None) != FORMAT:
+                raise InputError(f"{path}: format", "is not the one that this version reads", data, f"use {FORMAT!r}")
+            data.pop("table", None)
+            own = [as_dataclass(_Distribution, part, f"own[{i}]") for i, part in enumerate(data["own"])]
+            count = as_type(int, data["recordings"], "recordings")
+        table = path.with_suffix(".csv")
+        with reading(table, InputError):
+            header, *rows = csv.reader(io.StringIO(bounded_bytes(table, ROOM, InputError).decode()))
+            if header != _header(own) or len(rows) != count:
+                fix = "keep the two files that ManyFit.save wrote together"
+                raise InputError(str(table), f"is not the table of {path.name}", f"{len(rows)} rows", fix)
+            numbers = np.array([[float(x) if x else math.nan for x in row[1:]] for row in rows])
+        data["recordings"], data["misfit"] = [row[0] for row in rows], numbers[:, 0].tolist()
+        columns = numbers[:, 1:].T.tolist()
+        data["own"] = [
+            OwnParameter(p.name, p.unit, p.log, tuple(columns[2 * k]), tuple(columns[2 * k + 1]))
+            for k, p in enumerate(own)
+        ]
+        return as_dataclass(cls, data, "")
 
     def _sections(self) -> list[Section]:
         shared = []
@@ -112,7 +165,6 @@ class ManyFit:
         note = ("scatter", f"{words}; the larger counts")
         open_ones = [(e.name, e.words) for e in self.estimates if e.verdict not in ("identified", "weak")]
         own = [(p.name, *(short(x) for x in _spread(p.values)), p.unit, _typical(p)) for p in self.own]
-        shares = [f"{100 * share:g} %" for share in SHARES]
         misfit = ("misfit", *(short(x, 3) for x in np.quantile(self.misfit, SHARES)), "sigma", "")
         far = sorted(zip(self.misfit, self.recordings, strict=True), reverse=True)
         far = [(x, name) for x, name in far if x > FAR * float(np.median(self.misfit))]
@@ -128,7 +180,7 @@ class ManyFit:
             ("kept of a Jacobian", f"{short(self.jacobian_bytes / 1e6, 3)} MB"),
             ("not counted", "time step, mesh and given values; sheetbend.fit counts them, of a few of the recordings"),
         )
-        each = ("of each recording", *shares, "unit", "its own half-width")
+        each = ("of each recording", *LABELS, "unit", "its own half-width")
         return [
             Section("Shared parameters", headers, tuple(shared), (note, *open_ones)),
             Section("Recordings (shares that lie below)", each, (*own, misfit), tuple(notes)),
@@ -136,8 +188,18 @@ class ManyFit:
         ]
 
 
-def _sd_of(p: OwnParameter) -> str:
-    return f"sd of ln {p.name}" if p.log else f"sd of {p.name}" + (f" [{p.unit}]" if p.unit else "")
+def _header(own: Sequence[OwnParameter | _Distribution]) -> list[str]:
+    found = ["recording", "misfit [sigma]"]
+    for p in own:
+        unit = f" [{p.unit}]" if p.unit else ""
+        found += [f"{p.name}{unit}", f"sd of ln {p.name}" if p.log else f"sd of {p.name}{unit}"]
+    return found
+
+
+def _known(values: Sequence[float]) -> dict[str, float] | None:
+    """The distribution of what is known; None where nothing is."""
+    known = [x for x in values if not math.isnan(x)]
+    return dict(zip(LABELS, np.quantile(known, SHARES).tolist(), strict=True)) if known else None
 
 
 def _spread(values: tuple[float, ...]) -> list[float]:
