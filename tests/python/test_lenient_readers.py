@@ -242,3 +242,53 @@ def test_a_table_of_two_coordinates_is_told_what_it_lacks(tmp_path: Path) -> Non
     (tmp_path / "flat.csv").write_text("t,a_x,a_y,b_x,b_y\n0,1,2,3,4\n")
     with pytest.raises(RecordingError, match=r"only x and y of a marker.*a third column"):
         Recording.load(tmp_path / "flat.csv")
+
+
+SHEET = (
+    "Test 7: cable in a vise;;;;;;\r\n"
+    "# one camera;;;;;;\r\n"
+    ";;;;;;\r\n"
+    "Zeit [ms];a X [mm];a Y [mm];a Z [mm];b X [mm];b Y [mm];b Z [mm]\r\n"
+    "0,0;1,5;2;3;4;5;6\r\n"
+    "\r\n"
+    "10,0;;;;4;5;6,25\r\n"
+    ";;;;;;\r\n"
+)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "cp1252", "utf-16"])
+def test_a_sheet_with_a_title_above_its_table(tmp_path: Path, encoding: str) -> None:
+    """A title, lines of delimiters alone and Windows' encodings were refused."""
+    (tmp_path / "take.csv").write_bytes(SHEET.replace("vise", "Schraubstock, 5 °C").encode(encoding))
+    got = Recording.load(tmp_path / "take.csv")
+    assert got.markers == ("a", "b") and got.times.tolist() == [0.0, 0.01]
+    assert np.allclose(got.positions[0], [[1.5e-3, 2e-3, 3e-3], [4e-3, 5e-3, 6e-3]], rtol=0, atol=1e-18)
+    assert got.mask.tolist() == [[True, True], [False, True]]
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "Messung 7;;;;;;\n;a;;;b;;\nZeit [ms];X [mm];Y [mm];Z [mm];X [mm];Y [mm];Z [mm]\n",
+        ";a;a;a;b;b;b\nt / ms;x;y;z;x;y;z\n;mm;mm;mm;mm;mm;mm\n",
+        "time;a_x;a_y;a_z;b_x;b_y;b_z\n[ms];[mm];[mm];[mm];[mm];[mm];[mm]\n".replace("time", "time in ms"),
+        "Time (msec);a_x / mm;a_y / mm;a_z / mm;b_x in mm;b_y in mm;b_z in mm\n",
+    ],
+)
+def test_a_header_of_several_rows(tmp_path: Path, header: str) -> None:
+    text = header + "\n".join(table("", rows(), ";").replace(" ", "").split("\n")[1:])
+    (tmp_path / "take.csv").write_text(text.replace("0.01;", "10;").replace("0.02;", "20;").replace("0.03;", "30;"))
+    got = Recording.load(tmp_path / "take.csv")
+    assert got.markers == ("a", "b")
+    assert np.allclose(got.times, TIMES, rtol=0, atol=1e-15)
+    assert np.allclose(got.positions, 1e-3 * X, rtol=0, atol=1e-15)
+
+
+def test_axes_without_names_are_refused(tmp_path: Path) -> None:
+    """Two markers whose names nothing tells, and a title that begins like a header."""
+    (tmp_path / "take.csv").write_text("t;x;y;z;x;y;z\n0;1;2;3;4;5;6\n")
+    with pytest.raises(RecordingError, match="twice"):
+        Recording.load(tmp_path / "take.csv")
+    (tmp_path / "take.csv").write_text("measured by hand\ntime;day\n0;1\n")
+    with pytest.raises(RecordingError, match="line 1: must be a header whose first column is time"):
+        Recording.load(tmp_path / "take.csv")

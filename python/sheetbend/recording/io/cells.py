@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
@@ -14,20 +15,28 @@ from ...errors import RecordingError
 from .lost import without_zeros
 
 _NOT_SEEN = {"na", "n/a", "null", "none"}  # as tables of other programs write a cell without a value, beside nan
+_WIDE = (b"\xff\xfe", b"\xfe\xff")
+"""How UTF-16 begins."""
+_JUDGED = 4096  # bytes in which a file that is no text has a control character
 Row = tuple[int, list[str]]  # line number in the file, from 1, and the cells
 
 
 def lines(path: Path) -> list[tuple[int, str]]:
-    """The lines of a text file with their numbers from 1.
+    """The lines of a text file with their numbers from 1: of UTF-8, UTF-16 with its mark, or Windows-1252, as
+    spreadsheets write them.
 
     Raises:
-        RecordingError: it is no UTF-8.
+        RecordingError: it is no text.
     """
+    data = path.read_bytes()
+    wide = data[:2] in _WIDE
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = data.decode("utf-16" if wide else "utf-8-sig")
     except UnicodeDecodeError as error:
-        raise RecordingError(str(path), "is no UTF-8 text", str(error), "save it as a UTF-8 CSV") from error
-    return list(enumerate(text.split("\n"), start=1))
+        if wide or any(byte < 32 and byte not in b"\t\n\r\f" for byte in data[:_JUDGED]):
+            raise RecordingError(str(path), "is no UTF-8 text", str(error), "save it as a UTF-8 CSV") from error
+        text = data.decode("cp1252", errors="replace")
+    return list(enumerate(re.split("\r\n|\r|\n", text), start=1))
 
 
 def split(path: Path, number: int, line: str, delimiter: str) -> list[str]:

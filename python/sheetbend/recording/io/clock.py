@@ -13,7 +13,8 @@ from ...arrays.timeseries import Array
 from .cells import Row, number, refuse
 
 _WORDS = "time|timestamp|t|zeit|temps|tiempo|tempo|tijd|czas|время|时间|時間"
-_NAME = re.compile(rf"(%time)|(?:{_WORDS})[\s_/]*[(\[]?\s*(s|sec|seconds|ms|us|ns)?\s*[)\]]?", re.IGNORECASE)
+_UNITS = "s|sec|seconds|sekunden|ms|msec|milliseconds|millisekunden|us|µs|ns"
+_NAME = re.compile(rf"(%time)|(?:{_WORDS})[\s_/,]*(?:in\s+)?[(\[]?\s*({_UNITS})?\s*[)\]]?", re.IGNORECASE)
 _LONGEST = 40  # characters: blanks of a longer one would be matched in ever more ways
 PER_SECOND = {"ms": 10**3, "us": 10**6, "ns": 10**9}
 """Parts of a second, by the unit that counts them."""
@@ -29,6 +30,7 @@ def unit(name: str) -> str | None:
     if match is None:
         return None
     told = "ns" if match[1] else (match[2] or "s").lower()
+    told = "ms" if told.startswith(("msec", "milli")) else "us" if told == "µs" else told
     return told if told in PER_SECOND else "s"
 
 

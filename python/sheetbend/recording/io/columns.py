@@ -14,7 +14,8 @@ AXES = ("x", "y", "z")
 FIX = "name the columns of each marker <marker>_x, <marker>_y, <marker>_z"
 _LONGEST = 200  # characters of a name
 _UNIT = re.compile(
-    r"(.*[^\s\[(])[\s_]*[\[(]\s*(mm|cm|m|in|ft)\s*[\])]|(.*[_. ]?[xyz]\d*)[_ ](mm|cm|m)", re.IGNORECASE | re.DOTALL
+    r"(.*[^\s\[(])[\s_]*[\[(]\s*(mm|cm|m|in|ft)\s*[\])]|(.*[_. ]?[xyz]\d*)(?:[_ ]| ?/ ?| in )(mm|cm|m)",
+    re.IGNORECASE | re.DOTALL,
 )
 _WAYS = (
     re.compile(r"(?P<marker>.*)[_.: -](?P<axis>[xyz])", re.IGNORECASE | re.DOTALL),
@@ -40,7 +41,7 @@ def markers(path: Path, line: int, names: Sequence[str]) -> tuple[list[str], str
     if {name.lower() for name in names} >= _TURNS:
         fix = "they go with a cloth: sheetbend new cloth.csv --poses, or `[[scene.tool]]`; see docs/recordings.md"
         refuse(path, line, "names the poses of a body, and no markers", list(names), fix)
-    pairs = [_without_unit(name) for name in names]
+    pairs = [without_unit(name) for name in names]
     told = {unit for _, unit in pairs}
     if len(told) > 1:
         got = sorted("none" if unit is None else unit for unit in told)
@@ -56,7 +57,8 @@ def markers(path: Path, line: int, names: Sequence[str]) -> tuple[list[str], str
     return found, told.pop() if told else None
 
 
-def _without_unit(name: str) -> tuple[str, str | None]:
+def without_unit(name: str) -> tuple[str, str | None]:
+    """The name of a column and its length unit: `tip_x [mm]`, `tip_x_mm`, `tip_x / mm`, `tip_x in mm`."""
     match = _UNIT.fullmatch(name) if len(name) <= _LONGEST else None
     if match is None:
         return name, None

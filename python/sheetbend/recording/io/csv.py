@@ -18,8 +18,9 @@ the first row. A column `frame`, or one without a name, before it is not read; w
 `rate` of the JSON beside the file. `columns` says how markers and axes are written. Cells are separated by commas,
 semicolons or tabs. The decimal mark is a point, or a comma where no cell has a point and commas do not separate cells.
 An empty cell or `nan` is a marker not seen, and so is exactly 0, 0, 0 where a marker is otherwise far from there. Lines
-that start with # are comments. Coordinates are in the length unit of the header, `tip_x [mm]`, or of the JSON beside
-the file, meters without one.
+that start with # are comments; lines without a filled cell are not read. `heading` says what may stand about the
+header. Coordinates are in the length unit of the header, `tip_x [mm]`, or of the JSON beside the file, meters without
+one.
 """
 
 from __future__ import annotations
@@ -35,13 +36,14 @@ from ...errors import RecordingError
 from ...files.door import check_room
 from ...files.whole import written
 from ..marker_data import MarkerData
-from . import clock, columns, motive, motive_rows, qtm, sidecar, vicon
+from . import clock, columns, heading, motive, motive_rows, qtm, sidecar, vicon
 from .cells import Row, lines, number, refuse, split
 from .lost import without_zeros
 
 _DELIMITERS = (",", ";", "\t")
 _AXES = columns.AXES
 _FRAME = re.compile(r"frames?|frame[_ ]?(?:#|no|nr|number|index|id)?|index|", re.IGNORECASE)
+_EMPTY = ' \t\r;,"'  # of lines without a filled cell
 _DECIMAL_COMMA = re.compile(r",(?=\d)")
 
 
@@ -81,12 +83,15 @@ def write(recording: MarkerData, path: Path) -> None:
 
 def _rows(path: Path, text: list[tuple[int, str]]) -> list[Row]:
     """Header and rows as stripped cells, without comments, blank lines and the column before the time."""
-    kept = [(number, line) for number, line in text if line.strip() and not line.lstrip().startswith("#")]
+    kept = [(number, line) for number, line in text if line.strip(_EMPTY) and not line.lstrip().startswith("#")]
     if not kept:
         fix = "start with a header, time,<marker>_x,..."
         raise RecordingError(str(path), "holds no header", "only blank lines and comments", fix)
-    delimiter = _delimiter(path, *kept[0])
-    rows = [(number, split(path, number, line, delimiter)) for number, line in kept]
+    top = heading.first(kept, lambda line: _begins(path, line))
+    delimiter = _delimiter(path, *kept[top])
+    over = [(number, split(path, number, line, delimiter)) for number, line in kept[max(0, top - 1) : top]]
+    rows = [(number, split(path, number, line, delimiter)) for number, line in kept[top:]]
+    rows = heading.whole(over[0] if over else None, rows)
     if len(rows[0][1]) > 1 and all(len(cells) == len(rows[0][1]) and not cells[-1] for _, cells in rows):
         rows = [(number, cells[:-1]) for number, cells in rows]  # lines end in a delimiter
     if len(rows[0][1]) > 1 and _before_time(rows[0][1]):
@@ -104,6 +109,15 @@ def _with_points(rows: list[Row]) -> list[Row]:
 
 def _before_time(header: list[str]) -> bool:
     return _FRAME.fullmatch(header[0]) is not None and clock.unit(header[1]) is not None
+
+
+def _begins(path: Path, line: str) -> int:
+    """How many cells of a line are filled if it begins with a time, or with a frame before one; else 0."""
+    for delimiter in _DELIMITERS:
+        cells = [cell.strip() for cell in line.split(delimiter)]
+        if clock.unit(cells[0].strip('"')) is not None or (len(cells) > 1 and _before_time(cells)):
+            return sum(map(bool, cells))
+    return 0
 
 
 def _delimiter(path: Path, number: int, header: str) -> str:

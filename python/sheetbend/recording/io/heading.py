@@ -1,0 +1,76 @@
+"""The header of a table that a spreadsheet wrote: a title may stand above it, and it may take two or three rows.
+
+    Test 7: cable in a vise;;;;;;            not read
+    ;tip;;;weight;;                          names of markers, each above its x, y and z
+    Time;X;Y;Z;X;Y;Z                         the header
+    ms;mm;mm;mm;mm;mm;mm                     units
+
+The first row is the header where it begins with the name of a time; below a title, the first row does that also names
+three columns at least.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+
+from ...files.units import METERS
+from . import clock, columns
+from .cells import Row
+
+MOST = 30
+"""Rows above the header."""
+_BARE = re.compile(r"[\[(]?\s*([^\s\[\]()]*)\s*[\])]?")
+_TIMES = {"s", *clock.PER_SECOND}
+
+
+def first(rows: Sequence[tuple[int, str]], begins: Callable[[str], int]) -> int:
+    """Which of the lines is the header; the first one where none is.
+
+    Args:
+        rows: numbers and texts of lines.
+        begins: how many cells of a line are filled if it begins as a header does, else 0.
+    """
+    if not begins(rows[0][1]):
+        for k, (_, line) in enumerate(rows[1:MOST], start=1):
+            if begins(line) > len(columns.AXES):
+                return k
+    return 0
+
+
+def whole(above: Row | None, rows: list[Row]) -> list[Row]:
+    """The rows with one header, that has the markers' names of the row above it and the units of the row below."""
+    (line, header), *below = rows
+    if above is not None:
+        header = _with_names(above[1], header)
+    if below:
+        units = _units(below[0][1])
+        if units is not None and len(units) == len(header):
+            header = [_with_unit(name, own) for name, own in zip(header, units, strict=True)]
+            below = below[1:]
+    return [(line, header), *below]
+
+
+def _with_names(above: list[str], header: list[str]) -> list[str]:
+    """A header of times and bare axes, with the names that stand above every first axis."""
+    axes = [columns.without_unit(name)[0].lower() for name in header[1:]]
+    markers = range(1, len(header), 3)
+    if len(header) < 4 or axes != list(columns.AXES) * len(markers) or len(above) != len(header):
+        return header
+    names = [above[k] for k in markers]
+    if not all(names) or any(above[k + i] not in ("", above[k]) for k in markers for i in (1, 2)):
+        return header
+    return [header[0], *(f"{names[k // 3]} {name}" for k, name in enumerate(header[1:]))]
+
+
+def _with_unit(name: str, own: str) -> str:
+    """The name of a column with its unit, unless it has one."""
+    told = clock.unit(name) is not None and clock.unit(f"{name} [{own}]") is None
+    return name if not own or told or columns.without_unit(name)[1] is not None else f"{name} [{own}]"
+
+
+def _units(cells: list[str]) -> list[str] | None:
+    """Units of a row that holds nothing else; None of another row."""
+    bare = [match[1].lower() if (match := _BARE.fullmatch(cell)) else "?" for cell in cells]
+    places = bare[1:]
+    return bare if bare[0] in _TIMES | {""} and any(places) and set(places) <= {"", *METERS} else None
