@@ -167,6 +167,8 @@ def test_derivatives_with_respect_to_modes() -> None:
     bar[:, list(e.compared)] = r.reshape(len(TIMES), -1, 3) / NOISE
     gradient = rollout.gradient(bar).quantities
     assert [gradient[mode] for mode in modes[3:9]] == pytest.approx((J.T @ r)[1:], rel=1e-8)
+    report = sb.check_gradients(hung(), TIMES[:7], SOLVER, values=course(hung(), 0)[0])
+    assert report.passed and set(modes) <= {row.name for row in report.rows}
 
 
 def test_a_force_is_found_beside_the_stiffness() -> None:
