@@ -99,6 +99,22 @@ def test_a_prior_that_was_found_is_integrated_out() -> None:
     assert np.max(half / exact) > 1.1
 
 
+def test_heights_are_those_of_the_marginal_likelihood() -> None:
+    """Of residuals with the covariance 1 + A D^2 A', the mean stiffness integrated out."""
+    picture, field, J, r = linear(Smooth())
+    size, length = np.log([0.1, 0.5, 3.0]), np.log([0.005, 0.02, 0.3])
+    found = picture.heights([field], 0, size, length)
+    direct = np.zeros((3, 3))
+    for row, s in enumerate(size):
+        for column, t in enumerate(length):
+            weight = np.append(1.0 / field.at(s, t).deviations, 0.0)
+            J_all, r_all = np.vstack([J, np.diag(weight)]), np.append(r, weight * picture.u)
+            left = r_all - J_all @ np.linalg.lstsq(J_all, r_all, rcond=None)[0]
+            logs = np.linalg.slogdet(J_all.T @ J_all)[1] - 2.0 * np.log(weight[:2]).sum()
+            direct[row, column] = left @ left + logs
+    assert found - found[0, 0] == pytest.approx(direct - direct[0, 0], abs=1e-9)
+
+
 def test_data_that_tell_nothing_leave_all_of_the_prior() -> None:
     picture, field, _, _ = linear(Smooth(), informative=1e-7)
     _, left, of_modes = spread(picture, [field], 0, 2)

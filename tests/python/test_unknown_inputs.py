@@ -167,6 +167,8 @@ def test_derivatives_with_respect_to_modes() -> None:
     bar[:, list(e.compared)] = r.reshape(len(TIMES), -1, 3) / NOISE
     gradient = rollout.gradient(bar).quantities
     assert [gradient[mode] for mode in modes[3:9]] == pytest.approx((J.T @ r)[1:], rel=1e-8)
+    report = sb.check_gradients(hung(), TIMES[:7], SOLVER, values=course(hung(), 0)[0])
+    assert report.passed and set(modes) <= {row.name for row in report.rows}
 
 
 def test_a_force_is_found_beside_the_stiffness() -> None:
@@ -210,6 +212,36 @@ def test_each_recording_has_a_force_of_its_own() -> None:
     assert next(e for e in plan.estimates if e.name == "rope_EI").half_width == pytest.approx(
         fit["rope_EI"].half_width, rel=0.5
     )
+
+
+def test_a_plan_tells_what_is_left_of_a_force() -> None:
+    e, _ = seen(0)
+    prior = {"push": sb.Smooth(size=0.02, length=0.08)}
+    plan = sb.identify(e, parameters=["rope_EI"], smooth=prior)
+    (push,) = plan.inputs
+    fit = sb.fit(e, parameters=["rope_EI"], smooth=prior, **ALONE)
+    (found,) = fit.result.over_time
+    weights = np.full(11, 0.1)
+    weights[[0, -1]] = 0.05
+    mean = np.sqrt(weights @ np.mean(np.square(found.half_widths), axis=1))
+    assert push.half_width == pytest.approx(mean, rel=0.15) and push.prior == pytest.approx(1.96 * 0.02)
+    assert "Unknown inputs over time" in plan.report() and "push_x_1" not in plan.report()
+    half = {v.name: v.half_widths for v in plan.variants}["the same recordings once more"]
+    known = plan["rope_EI"].half_width
+    assert known is not None and half["rope_EI"] == pytest.approx(known / np.sqrt(2), rel=0.1)  # and another force
+
+
+def test_a_force_is_zero_in_a_recording_that_is_only_predicted() -> None:
+    (first, _), (second, truth) = seen(6, "first"), seen(7, "second")
+    for predict in ("mean", "window"):
+        fit = sb.fit([first, replace(second, predict=predict)], parameters=["rope_EI"], **ALONE)
+        values = fit.values_of(second)
+        at = np.array([values[mode] for mode in second.scene.over_time["push"].modes])
+        force = (second.scene.over_time["push"].shapes @ at).reshape(-1, 3)
+        if predict == "mean":
+            assert not force.any() and "push" not in [given.name[:4] for given in fit.result.given]
+        else:
+            assert np.sqrt(np.mean((force - truth)[2:-1] ** 2)) < 0.4 * np.std(truth)
 
 
 def test_what_makes_no_input_is_refused() -> None:

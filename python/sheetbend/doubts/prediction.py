@@ -104,7 +104,8 @@ def predicted_values(
     threads: int,
 ) -> tuple[dict[str, float], tuple[Given, ...], dict[str, np.ndarray]]:
     """All values, with the private parameters of the experiments that are only predicted: fitted to their own windows
-    or the others' mean; and the corrections of driven markers (`FitProblem.corrections`) that the former found."""
+    or the others' mean, and zero for unknown inputs over time, which no other recording tells; and the corrections
+    of driven markers (`FitProblem.corrections`) that the former found."""
     complete = dict(values)
     given: list[Given] = []
     corrected: dict[str, np.ndarray] = {}
@@ -112,9 +113,13 @@ def predicted_values(
         if e.predict is None:
             continue
         private = [p for p in wanted.values() if p.private and p.tied_to is None and p.name in e.scene.quantities]
+        unknown = {mode for own in e.scene.over_time.values() for mode in own.modes}
         if e.predict == "mean" or refitter is None:
             words = "mean of the fitted recordings"
             for p in private:
+                if p.name in unknown:
+                    complete[f"{p.name}[{e.name}]"] = 0.0
+                    continue
                 others = [v for key, v in values.items() if key.partition("[")[0] == p.name]
                 own = e.scene.quantities[p.name].value if p.initial is None else p.initial
                 complete[f"{p.name}[{e.name}]"] = float(np.mean(others)) if others else own
@@ -132,6 +137,7 @@ def predicted_values(
         given += [
             Given(name=f"{p.name}[{e.name}]", value=complete[f"{p.name}[{e.name}]"], unit=p.unit, words=words)
             for p in private
+            if p.name not in unknown
         ]
     return complete, tuple(given), corrected
 

@@ -10,7 +10,7 @@ wide intervals are linear.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -26,7 +26,8 @@ from ..experiment.wanted import ParameterLike, as_parameters
 from ..minimum.growth import growths, in_words
 from ..minimum.linear_algebra import one_blas_thread
 from ..minimum.problem import FitProblem
-from ..minimum.smooth import Smooth, with_fields
+from ..minimum.smooth import Field, Smooth, with_fields
+from ..objects.over_time import OverTime
 from ..optional import require
 from ..quantities.parameters import Parameters
 from ..recording.recording import Recording
@@ -38,13 +39,14 @@ from ..statistics.intervals import open_estimate
 from ..statistics.judge import Nuisance
 from ..statistics.layout import Layout
 from .experiments import experiments_of
-from .plan import Plan, Variant
+from .plan import Plan, PlannedInput, Variant
 from .variants import changes
 
 DRAWS = 11  # of the noise; odd, so that there is one in the middle
 KNOWN = 0.05  # of a logarithm or a natural scale: combinations that are known so well are not named
 TAKES_PART = 0.2  # of the weakest combination's largest part
 SEED = 8
+NORMAL = 1.96  # standard deviations in the half-width of a 95 % interval
 
 
 @dataclass(frozen=True)
@@ -128,7 +130,7 @@ def identify(
     check_kind("instead", {} if instead is None else instead, Mapping, "give lists of experiments by words")
     check_count("threads", threads, 1, MOST_WHOLE, InputError)
     experiments = _planned(scene, recording, experiment)
-    wanted, _ = with_fields(as_parameters(parameters, experiments), experiments, smooth or {})
+    wanted, fields = with_fields(as_parameters(parameters, experiments), experiments, smooth or {})
     expected = _Noise(noise, autocorrelation)
     found = _Predicted(experiments, wanted, expected, threads)
     variants = []
@@ -138,15 +140,28 @@ def identify(
         for name, others, parameters_there in changes(experiments, found.problem.parameters, wanted):
             variants.append(_variant(name, others, parameters_there, expected, threads))
     grown = growths(found.problem, found.u)
+    inputs = tuple(_inputs(fields, {e.name: e.half_width for e in found.estimates}))
     return Plan(
         estimates=found.estimates,
         rank=found.judged.rank,
         gauges=tuple(gauge.words for gauge in found.judged.gauges),
-        weakest=found.weakest(),
+        weakest=found.weakest({mode for one in inputs for mode in one.modes}),
         noise=(expected.words(experiments),),
         growth=tuple(in_words(g) for g in grown),
         variants=tuple(variants),
+        inputs=inputs,
     )
+
+
+def _inputs(fields: Sequence[Field], half_widths: Mapping[str, float | None]) -> Iterator[PlannedInput]:
+    """The mean square of an input along an axis is the sum of its modes' squares, whose shapes have one of 1."""
+    for field in fields:
+        for (modes, names), recording in zip(field.each, field.own or [""], strict=True):
+            if isinstance(modes, OverTime):
+                known = [half for name in names if (half := half_widths[name]) is not None]
+                half = math.sqrt(sum(h**2 for h in known) / 3.0) if len(known) == len(names) else None
+                name = f"{modes.name}[{recording}]" if recording else modes.name
+                yield PlannedInput(name, modes.unit, half, NORMAL * field.size, names)
 
 
 def _planned(
@@ -213,10 +228,10 @@ class _Predicted:
             for r in left.T
         ]
 
-    def weakest(self) -> str:
-        """The combination of parameters that is determined least, in words."""
+    def weakest(self, apart: set[str]) -> str:
+        """The combination of parameters that is determined least, in words, those in `apart` left out."""
         parameters = self.problem.parameters
-        known = [i for i, e in enumerate(self.judged.estimates) if e.half_width is not None]
+        known = [i for i, e in enumerate(self.judged.estimates) if e.half_width is not None and e.name not in apart]
         names = [parameters.free[i] for i in known]
         if len(known) < 2:
             return ""
@@ -227,7 +242,7 @@ class _Predicted:
                 a, b = names.index(pair.first), names.index(pair.second)
                 R[a, b] = R[b, a] = pair.value
         values, vectors = np.linalg.eigh(R * np.outer(sd, sd))
-        spread = 1.96 * math.sqrt(max(float(values[-1]), 0.0))
+        spread = NORMAL * math.sqrt(max(float(values[-1]), 0.0))
         if spread < KNOWN:
             return ""
         weight = vectors[:, -1] / vectors[np.argmax(np.abs(vectors[:, -1])), -1]
@@ -240,7 +255,7 @@ class _Predicted:
     def _sd(self, i: int) -> float:
         """Internal standard deviation of a parameter, over its natural scale."""
         e, p = self.judged.estimates[i], self.problem.parameters[self.problem.parameters.free[i]]
-        half = (e.half_width or 0.0) / 1.96
+        half = (e.half_width or 0.0) / NORMAL
         return half / abs(e.value) if p.log else half / (p.scale or 1.0)
 
 

@@ -33,6 +33,25 @@ class Variant:
 
 
 @dataclass(frozen=True)
+class PlannedInput:
+    """What is to be expected of an unknown force or wind over time.
+
+    Attributes:
+        name: of the input; with several recordings also that of its recording, in brackets.
+        unit: of its values.
+        half_width: 95 %, root mean square over the time and the axes; None where it is open.
+        prior: the same of its prior.
+        modes: names of its parameters.
+    """
+
+    name: str
+    unit: str
+    half_width: float | None
+    prior: float
+    modes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Plan:
     """What a fit to recordings of the planned experiments can be expected to print.
 
@@ -45,6 +64,7 @@ class Plan:
         noise: what was assumed of it, in words.
         growth: of small displacements along each motion, in words.
         variants: what changes of the plan would give.
+        inputs: of the unknown inputs over time, whose modes are estimates too.
     """
 
     estimates: tuple[Estimate, ...]
@@ -54,6 +74,7 @@ class Plan:
     noise: tuple[str, ...]
     growth: tuple[str, ...]
     variants: tuple[Variant, ...] = ()
+    inputs: tuple[PlannedInput, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of that name; KeyError names the ones there are."""
@@ -68,16 +89,32 @@ class Plan:
 
     def sections(self) -> list[Section]:
         """The report as data, empty sections left out."""
-        rows = [_row(e) for e in self.estimates]
+        rows = [_row(e) for e in self._told]
         headers = ("parameter", "planned", "+/-", "95 % interval", "unit", "verdict to expect")
-        notes = tuple((e.name, e.words) for e in self.estimates if e.verdict != "identified")
+        notes = tuple((e.name, e.words) for e in self._told if e.verdict != "identified")
         parts = [
             Section("Intervals to expect", headers, tuple(rows), notes),
+            self._over_time(),
             Section("What the plan cannot tell", notes=self._weak()),
             Section("What it assumes", notes=tuple(("", words) for words in (*self.noise, *self.growth))),
             self._compared(),
         ]
         return [part for part in parts if part.rows or part.notes]
+
+    @property
+    def _told(self) -> list[Estimate]:
+        """The estimates but for modes of inputs over time."""
+        modes = {mode for one in self.inputs for mode in one.modes}
+        return [e for e in self.estimates if e.name not in modes]
+
+    def _over_time(self) -> Section:
+        rows = tuple(
+            (one.name, "" if one.half_width is None else short(one.half_width, 2), short(one.prior, 2), one.unit)
+            for one in self.inputs
+        )
+        note = ("+/-", "95 %, root mean square over the time and the axes, with the recording and of the prior alone")
+        headers = ("input", "+/-", "+/- of the prior", "unit")
+        return Section("Unknown inputs over time", headers, rows, (note,) if rows else ())
 
     def _weak(self) -> tuple[tuple[str, str], ...]:
         gauges = tuple(("", gauge) for gauge in self.gauges)
@@ -85,7 +122,7 @@ class Plan:
 
     def _compared(self) -> Section:
         """Half-widths of each variant over those of the plan."""
-        names = [e.name for e in self.estimates]
+        names = [e.name for e in self._told]
         rows = []
         for variant in self.variants:
             cells = [_gain(self[name], variant.half_widths[name], variant.verdicts[name]) for name in names]
@@ -104,6 +141,7 @@ class Plan:
             "noise": list(self.noise),
             "growth": list(self.growth),
             "variants": [asdict(variant) for variant in self.variants],
+            "inputs": [asdict(one) for one in self.inputs],
         }
 
     def save(self, path: str | Path) -> None:

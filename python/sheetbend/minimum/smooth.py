@@ -254,10 +254,12 @@ class Picture:
         kept = np.delete(rows, theirs, axis=0)
         return cls(np.asarray(np.linalg.qr(kept, mode="r")), columns, u)
 
-    def rows_with(self, fields: Sequence[Field]) -> Array:
-        """The triangle of Jacobian and residuals, with the rows of the fields' priors below."""
+    def rows_with(self, fields: Sequence[Field], without: int | None = None) -> Array:
+        """The triangle of Jacobian and residuals, with the rows of the fields' priors below, but for one field."""
         below = []
-        for field, own in zip(fields, self.columns, strict=True):
+        for k, (field, own) in enumerate(zip(fields, self.columns, strict=True)):
+            if k == without:
+                continue
             weight = 1.0 / field.deviations
             rows = np.zeros((len(own), self.triangle.shape[1]))
             rows[np.arange(len(own)), own] = weight
@@ -272,22 +274,26 @@ class Picture:
         root = np.linalg.pinv(R[:p, :p])
         return -root @ R[:p, -1], root
 
-    def deviance(self, fields: Sequence[Field]) -> float:
-        """Minus twice the logarithm of the marginal likelihood, up to a constant."""
-        R = np.asarray(np.linalg.qr(self.rows_with(fields), mode="r"))
-        p = len(self.u)
-        size = np.abs(np.diag(R))[:p]
-        known = size > 1e-9 * size.max(initial=1e-300)
-        spread = sum(float(np.log(f.deviations).sum()) for f in fields)
-        return float(np.sum(R[p:, -1] ** 2)) + 2.0 * (float(np.log(size[known]).sum()) + spread)
-
     def heights(self, fields: Sequence[Field], i: int, size: Array, length: Array) -> Array:
-        """(sizes, lengths) the deviance of the logarithms of both, of one field."""
+        """(sizes, lengths) minus twice the logarithm of the marginal likelihood, up to a constant, at the logarithms of
+        both, of one field.
 
-        def at(s: float, t: float) -> float:
-            return self.deviance([*fields[:i], fields[i].at(s, t), *fields[i + 1 :]])
-
-        return np.array([[at(s, t) for t in length] for s in size])
+        With R = [A | c] the triangle of its modes, all other columns eliminated, and D the deviations for a size of 1,
+        the residuals c of a field that is zero have the covariance 1 + size^2 A D^2 A'. One decomposition of A D into
+        singular values serves all sizes.
+        """
+        own = self.columns[i]
+        rest = np.setdiff1d(np.arange(len(self.u)), own)
+        rows = self.rows_with(fields, i)[:, [*rest, *own, -1]]
+        R = np.asarray(np.linalg.qr(rows, mode="r"))[len(rest) :, len(rest) :]
+        c = R[:, -1] - R[:, :-1] @ self.u[own]
+        found = []
+        for t in length:
+            U, values, _ = np.linalg.svd(R[:, :-1] * fields[i].at(0.0, t).deviations, full_matrices=False)
+            gain = np.exp(2.0 * size)[:, None] * values**2
+            taken = (U.T @ c) ** 2 * gain / (1.0 + gain)
+            found.append(float(c @ c) + np.sum(np.log1p(gain) - taken, axis=1))
+        return np.stack(found, axis=1)
 
     def possible(self, fields: Sequence[Field], i: int) -> tuple[tuple[Field, ...], Array]:
         """One field with each size and length that is possible, and their probabilities, which sum to one.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..result.field import FieldFit
-from .drawing import ACCENT, GRAY, PALE, clean, key, panels_in
+from .drawing import ACCENT, GRAY, INK, PALE, clean, key, panels_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,5 +41,5 @@ def plot_along(found: FieldFit, *, title: str = "", ax: Axes | None = None) -> A
     for panel in panels:
         panel.margins(x=0)
     panels[-1].set_xlabel("along the rope [m]")
-    key(whole, [("found", ACCENT), ("95 % interval", PALE)])
+    key(whole, [("found", ACCENT), ("shaded: 95 % interval", INK)])
     return panels[0]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..result.over_time import OverTimeFit
-from .drawing import ACCENT, GRAY, PALE, clean, key, panels_in
+from .drawing import ACCENT, GRAY, INK, PALE, clean, key, panels_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,5 +43,5 @@ def plot_over_time(
         panel.margins(x=0)
         panel.set_ylabel(f"{found.kind} {AXES[k]} [{found.unit}]")
     panels[-1].set_xlabel("time [s]")
-    key(whole, [("found", ACCENT), ("95 % interval", PALE)])
+    key(whole, [("found", ACCENT), ("shaded: 95 % interval", INK)])
     return np.array(panels)
