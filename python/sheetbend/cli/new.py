@@ -97,7 +97,7 @@ def new(
     up: Annotated[
         Up | None,
         typer.Option(
-            help="Axis of the recording that points up, if the guess or the file is wrong.",
+            help="Axis of the recording or mesh that points up, if the guess or the file is wrong.",
             show_default=False,
         ),
     ] = None,
@@ -147,7 +147,7 @@ def _new(
     if measured.weight is not None and not 0 <= measured.weight < float("inf"):
         raise ConfigError("--weight", "must be zero or more", measured.weight, "give kg")
     if is_mesh := files[0].suffix.lower() in garment.FILES:
-        _check_mesh(files, measured, up, markers, poses)
+        _check_mesh(files, measured, markers, poses)
         name = _name(files[0].stem)
     else:
         with options(units="--units"):
@@ -164,7 +164,7 @@ def _new(
     named = [Path(os.path.relpath(file, target.parent)).as_posix() for file in files]
     if is_mesh:
         with options(unit="--units"):
-            found = garment.draft_of_mesh(files[0], named[0], name, measured, units)
+            found = garment.draft_of_mesh(files[0], named[0], name, measured, units, up)
         return _written(console, target, name, found, "the mesh", f"sheetbend simulate {target} --mesh gltf")
     if poses is not None:
         if len(files) > 1:
@@ -211,7 +211,7 @@ def _chosen(recording: Recording, markers: str) -> Recording:
     return recording.select([name for name in recording.markers if any(fnmatchcase(name, p) for p in patterns)])
 
 
-def _check_mesh(files: list[Path], measured: Measured, up: Up | None, markers: str | None, poses: Path | None) -> None:
+def _check_mesh(files: list[Path], measured: Measured, markers: str | None, poses: Path | None) -> None:
     """A garment comes in one file, has no length, and nothing moves it."""
     if poses is not None:
         raise ConfigError("--poses", "go with a recording, and the first file is a mesh", str(poses), "leave them out")
@@ -223,10 +223,6 @@ def _check_mesh(files: list[Path], measured: Measured, up: Up | None, markers: s
         raise ConfigError("--weight", "is of a rope", measured.weight, "leave it out")
     if markers is not None:
         raise ConfigError("--markers", "are of a recording", markers, "leave them out")
-    if up is not None:
-        raise ConfigError(
-            "--up", "is of a recording", str(up), "leave it out, and change `gravity` in the configuration"
-        )
 
 
 def _built(console: Console, target: Path) -> dict[str, Any]:
