@@ -207,3 +207,42 @@ def test_a_ply_carries_fields(tmp_path: Path) -> None:
     ):
         with pytest.raises(sb.MeshError, match=message):
             sb.mesh.write_ply(tmp_path / "b.ply", mesh, **fields)
+
+
+def obj(path: Path, vertices: list[tuple[float, ...]], faces: list[tuple[int, ...]]) -> Path:
+    lines = [f"v {x} {y} {z}" for x, y, z in vertices]
+    path.write_text("\n".join([*lines, *("f " + " ".join(str(k + 1) for k in face) for face in faces)]) + "\n")
+    return path
+
+
+STRIP = [(float(x), float(y), 0.0) for x in range(4) for y in range(2)]
+FACES = [(0, 2, 1), (1, 2, 3), (2, 4, 3), (3, 4, 5), (4, 6, 5), (5, 6, 7)]
+
+
+def test_triangles_that_face_against_the_others_are_reversed(tmp_path: Path) -> None:
+    """They were refused, and so were vertices that no face uses."""
+    turned = [face[::-1] if k in (1, 4) else face for k, face in enumerate(FACES)]
+    path = obj(tmp_path / "strip.obj", [(9.0, 9.0, 9.0), *STRIP], [tuple(k + 1 for k in face) for face in turned])
+    with pytest.raises(sb.MeshError, match=r"oriented against each other .*read it with `merge`"):
+        sb.read_mesh(path)
+    with pytest.warns(UserWarning, match="2 triangles that face against the others are reversed") as said:
+        mesh = sb.read_mesh(path, merge=True)
+    assert sorted(map(sorted, mesh.triangles.tolist())) == sorted(map(sorted, FACES)) and len(mesh.vertices) == 8
+    assert "vertices without a triangle are left out: 1" in " ".join(str(w.message) for w in said)
+
+
+def test_a_surface_of_one_side_stays_refused(tmp_path: Path) -> None:
+    n = 12
+    angle = 2 * np.pi * np.arange(n) / n
+    rim = [
+        ((1 + s * np.cos(a / 2)) * np.cos(a), (1 + s * np.cos(a / 2)) * np.sin(a), s * np.sin(a / 2))
+        for a in angle
+        for s in (-0.3, 0.3)
+    ]
+    faces = []
+    for i in range(n):
+        a, b = 2 * i, 2 * i + 1
+        c, d = (2 * i + 2, 2 * i + 3) if i + 1 < n else (1, 0)
+        faces += [(a, c, b), (b, c, d)]
+    with pytest.raises(sb.MeshError, match="oriented against each other"):
+        sb.read_mesh(obj(tmp_path / "moebius.obj", rim, faces), merge=True)

@@ -132,6 +132,37 @@ def test_a_fabric_in_grams_is_named() -> None:
     assert "cloth_density of 150 kg/m^2 is that of 19 mm of steel" in said
 
 
+def test_a_length_in_another_unit_is_named() -> None:
+    """`length = 60` beside markers in meters, and `density = 50` of a rope of 0.6 m, passed without a word."""
+    e = fall(rope())
+    given = as_parameters(["rope_EI"], [e])
+
+    def said(**changed: Any) -> str:
+        return " ".join(implausible(FitProblem([replace(e, **changed)], given)))
+
+    assert said() == ""
+    long = said(scene=rope(length=50.0, EI=2e3))
+    assert "markers placed on rope are 1" in long and "100 is cm told as m" in long
+    assert "1000 is mm told as m" in said(recording=replace(e.recording, positions=1e3 * e.recording.positions))
+    assert "`sigma` of" in (noisy := said(sigma=0.5)) and "Told in mm, it would be 0.0005" in noisy
+    heavy = sb.Scene("rope")
+    sb.add_rope(heavy, "rope", segments=8, length=0.5, density=0.05, EI=2e-3, clamp_start=(1, 0, 0))
+    heavy.add_point_mass(8, 20.0, "plug")
+    assert "`mass` of plug is 20 kg" in said(scene=heavy)
+    assert "Is it in g/m? Then write `density` = 0.05" in said(scene=rope(density=50.0, EI=2.0))
+
+
+def test_a_rope_much_longer_than_its_markers_show_is_named() -> None:
+    x = np.linspace(0.0, 0.6, 3)[:, None] * np.array([1.0, 0.0, 0.0])
+    recording = sb.Recording(positions=np.repeat(x[None], 3, axis=0), times=[0.0, 0.1, 0.2], name="still")
+    scene = sb.Scene("rope")
+    made = sb.add_rope(scene, "rope", segments=100, length=30.0, density=0.05, EI=2e-3, clamp_start=(1, 0, 0))
+    scene.pin(made.particles[:1])
+    e = sb.Experiment(scene=scene, recording=recording, markers=[sb.on_particle(k) for k in range(3)], solver=SOLVER)
+    (words,) = implausible(FitProblem([e], as_parameters(["rope_EI"], [e])))
+    assert words == "`length` of rope is 30 m, 50 times as far as its last marker in still"
+
+
 def test_a_mirror_is_told_from_a_rotation() -> None:
     rng = np.random.default_rng(0)
     x, seen = rng.standard_normal((20, 4, 3)), np.ones((20, 4), dtype=bool)

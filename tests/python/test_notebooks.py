@@ -57,6 +57,9 @@ def test_fits_and_results_show_themselves(monkeypatch: pytest.MonkeyPatch) -> No
         scene=hanging(), recording=sb.Recording(x, times), markers=[sb.on_particle(int(p)) for p in seen], solver=SOLVER
     )
     found = sb.fit(e, parameters=["rope_EI"], refine=False, profiles=False, beginnings=False)
+    assert (
+        "height:1060px" in found._repr_html_() and "height:780px" in hanging()._repr_html_()
+    )  # the motion is in sight
     assert shown(found)["motions"][0]["simulated"]
     assert shown(found.result)["motions"] == []
     monkeypatch.setitem(sys.modules, "jinja2", None)

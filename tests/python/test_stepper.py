@@ -251,7 +251,9 @@ def test_copies_files_and_workers() -> None:
     file = io.BytesIO()
     torch.save(state, file)
     file.seek(0)
-    assert torch.equal(stepper(torch.load(file, weights_only=False)).numbers, expected)
+    assert torch.equal(stepper(torch.load(file)).numbers, expected)
+    with pytest.raises(sb.InputError, match="do not make a batch"):
+        State.stack([])
     (batch,) = DataLoader(Motions(stepper), batch_size=4, num_workers=1)
     assert torch.equal(batch.numbers, torch.stack([s.numbers for s in chain(stepper, 3)]))
 

@@ -68,3 +68,12 @@ def test_gradient(number, field):
     noise = 1e-7 * abs(test.value / getattr(fabric, field))
     assert test.gradient[f"cloth_{field}"] == approx(difference, rel=1e-6, abs=noise)
     assert test.gradient[f"cloth_{field}"] != 0.0
+
+
+@pytest.mark.parametrize("c", [1.3e-3, 2.7e-3, 9e-3, 70e-3])
+def test_limp_and_stiff_fabrics(c):
+    """2.7 mm was refused: the number of cells across, and with it that of the inputs, changed with the length."""
+    fabric = sb.Fabric(density=0.08, warp=300.0, shear=20.0, bending=0.08 * 9.81 * c**3)
+    test = textile.cantilever(fabric, cells=12)
+    assert test.bending_length.laboratory == approx(1e3 * c, rel=6e-3)
+    assert test.overhang.gradient["cloth_bending"] == approx(test.overhang.value / (3.0 * fabric.bending), rel=5e-3)

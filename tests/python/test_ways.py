@@ -80,6 +80,16 @@ def test_the_unit_of_a_garment_is_told_by_its_size(folder: Path, unit: str, scal
     assert "5 vertices lie within" in result.stdout
 
 
+@pytest.mark.parametrize(("up", "gravity", "corner"), [("x", -9.81, "lower"), ("-x", 9.81, "upper")])
+def test_the_axis_of_a_garment_that_points_up_is_told(folder: Path, up: str, gravity: float, corner: str) -> None:
+    sb.mesh.write_obj(folder / "panel.obj", sb.mesh.grid(0.4, 0.6, 4, 6))
+    result = run("new", "panel.obj", "--up", up)
+    assert result.exit_code == 0 and "7 vertices lie within" in result.stdout and "which axis" not in result.stdout
+    draft = tomllib.loads((folder / "panel.toml").read_text())
+    assert draft["scene"]["gravity"] == [gravity, 0.0, 0.0] and corner in draft["scene"]["cloth"][0]["set"][0]
+    assert run("simulate", "panel.toml", "--duration", "0.05").exit_code == 0
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

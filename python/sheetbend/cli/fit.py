@@ -14,6 +14,7 @@ from rich.console import Console
 from ..config import Config, GrippedConfig, Study, build, parse_any
 from ..config.driven_motion import driven_files, save_driven, with_driven
 from ..config.values import with_values, write
+from ..doubts.implausible import implausible
 from ..errors import ConfigError
 from ..experiment.wanted import as_parameters
 from ..files.door import reading
@@ -167,6 +168,7 @@ def _fit_study(console: Console, study: Study, source: Path, folder: Path, movie
     problem = FitProblem(fitted, as_parameters(study.parameters, study.experiments))
     _check_starts(config, problem)
     listing(console, study.assumptions)
+    listing(console, (f"warning: {words}" for words in implausible(problem)))
     form, page = figures_form(console, config), page_possible(console)
     with Iterations(console, problem.parameters) as progress:
         found = run_fit(study.experiments, parameters=study.parameters, progress=progress, **study.options)

@@ -13,8 +13,10 @@ from rich.console import Console
 from rich.table import Table
 
 from ..config import GrippedConfig, build, parse_any, scene_alone
+from ..doubts.implausible import other_than_meant
 from ..errors import ConfigError
 from ..experiment.experiment import Experiment
+from ..experiment.wanted import as_parameters
 from ..files.door import reading
 from ..gripped.plausible import doubts, gravities
 from ..minimum.by_ceres import ceres_trouble, has_ceres
@@ -135,6 +137,9 @@ def _config(console: Console, path: Path) -> dict[str, Any]:
     for scene in scenes:
         console.print("  " + ", ".join(f"{name} {_text(value)}" for name, value in scene.items()), soft_wrap=True)
     listing(console, study.assumptions)
+    if study.experiments:
+        fitted = as_parameters(study.parameters, study.experiments) if study.parameters else None
+        listing(console, (f"warning: {words}" for words in other_than_meant(study.experiments, fitted)))
     grown = [over_fit(e) for e in study.experiments if not e.static and e.predict is None]
     for g in grown:
         console.print(f"  {in_words(g)}", markup=False, soft_wrap=True)

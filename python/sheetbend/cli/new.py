@@ -84,13 +84,20 @@ def new(
     length: Annotated[
         float | None, typer.Option(help="Measured length of the rope or beam in m.", show_default=False)
     ] = None,
+    weight: Annotated[
+        float | None,
+        typer.Option(
+            help="Mass in kg that hangs at the free end of a rope or cable; 0 if that end is free and carries none.",
+            show_default=False,
+        ),
+    ] = None,
     units: Annotated[
         str | None, typer.Option(help="Length unit of the files: m, cm, mm, in or ft.", show_default=False)
     ] = None,
     up: Annotated[
         Up | None,
         typer.Option(
-            help="Axis of the recording that points up, if the guess or the file is wrong.",
+            help="Axis of the recording or mesh that points up, if the guess or the file is wrong.",
             show_default=False,
         ),
     ] = None,
@@ -117,7 +124,7 @@ def new(
 
     Example: sheetbend new take.csv --density 0.05
     """
-    measured = Measured(density, length)
+    measured = Measured(density, length, weight=weight)
     run(lambda console: _new(console, files, output, measured, units, up, markers, poses), json)
 
 
@@ -137,8 +144,10 @@ def _new(
     ):
         if given is not None and not 0 < given < float("inf"):
             raise ConfigError(option, "must be positive", given, fix)
+    if measured.weight is not None and not 0 <= measured.weight < float("inf"):
+        raise ConfigError("--weight", "must be zero or more", measured.weight, "give kg")
     if is_mesh := files[0].suffix.lower() in garment.FILES:
-        _check_mesh(files, measured, up, markers, poses)
+        _check_mesh(files, measured, markers, poses)
         name = _name(files[0].stem)
     else:
         with options(units="--units"):
@@ -155,7 +164,7 @@ def _new(
     named = [Path(os.path.relpath(file, target.parent)).as_posix() for file in files]
     if is_mesh:
         with options(unit="--units"):
-            found = garment.draft_of_mesh(files[0], named[0], name, measured, units)
+            found = garment.draft_of_mesh(files[0], named[0], name, measured, units, up)
         return _written(console, target, name, found, "the mesh", f"sheetbend simulate {target} --mesh gltf")
     if poses is not None:
         if len(files) > 1:
@@ -168,7 +177,7 @@ def _new(
     try:
         found = draft(takes, name, measured)
     except RecordingError as error:
-        if error.field in ("length", "poses"):
+        if error.field in ("length", "poses", "weight"):
             raise ConfigError(f"--{error.field}", error.problem, error.got, error.fix) from error
         raise
     return _written(console, target, name, found, "the recording", f"sheetbend fit {target}")
@@ -202,7 +211,7 @@ def _chosen(recording: Recording, markers: str) -> Recording:
     return recording.select([name for name in recording.markers if any(fnmatchcase(name, p) for p in patterns)])
 
 
-def _check_mesh(files: list[Path], measured: Measured, up: Up | None, markers: str | None, poses: Path | None) -> None:
+def _check_mesh(files: list[Path], measured: Measured, markers: str | None, poses: Path | None) -> None:
     """A garment comes in one file, has no length, and nothing moves it."""
     if poses is not None:
         raise ConfigError("--poses", "go with a recording, and the first file is a mesh", str(poses), "leave them out")
@@ -210,12 +219,10 @@ def _check_mesh(files: list[Path], measured: Measured, up: Up | None, markers: s
         raise ConfigError("FILES", "are several, and the first is a mesh", [str(f) for f in files], "give one mesh")
     if measured.length is not None:
         raise ConfigError("--length", "is of a rope or a beam", measured.length, "leave it out")
+    if measured.weight is not None:
+        raise ConfigError("--weight", "is of a rope", measured.weight, "leave it out")
     if markers is not None:
         raise ConfigError("--markers", "are of a recording", markers, "leave them out")
-    if up is not None:
-        raise ConfigError(
-            "--up", "is of a recording", str(up), "leave it out, and change `gravity` in the configuration"
-        )
 
 
 def _built(console: Console, target: Path) -> dict[str, Any]:

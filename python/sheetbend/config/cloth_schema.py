@@ -40,7 +40,11 @@ class ClothMesh(Section):
     )
     texture_size: Finite | None = key(None, "of one unit of texture coordinates; 1 when left out", "m", gt=0)
     warp: Vector | None = key(None, "direction of the warp in the mesh; x when left out; of a file with `unfold` only")
-    merge: bool | None = key(None, "make one vertex of those of the file at equal positions; no when left out")
+    merge: bool | None = key(
+        None,
+        "mend what exporters leave: one vertex of those at equal positions, no vertices without a triangle, triangles "
+        "that face one way; no when left out",
+    )
 
     @model_validator(mode="after")
     def _keys_of_kind(self) -> Self:

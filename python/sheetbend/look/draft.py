@@ -64,6 +64,9 @@ def draft(takes: Sequence[Take], name: str, measured: Measured | None = None) ->
     if measured is not None and measured.poses is not None and model is not cloth:
         fix = "leave them out: a rope takes markers on what holds it"
         raise RecordingError("poses", "are for a cloth that a robot holds, and this is", found.kind, fix)
+    if measured is not None and measured.weight is not None and model is not rope:
+        fix = "leave it out; correct the masses in the configuration"
+        raise RecordingError("weight", "hangs at a rope or cable, and this is", found.kind, fix)
     told = (*_told(takes, found.up), *found.notes)
     return written(found.kind, name, [t.file for t in takes], told, found.unknown, found.lines)
 

@@ -21,14 +21,21 @@ COUNTS = 0.05  # of the mass of the rope: a smaller one cannot be told from mark
 AGREE = 0.25  # of the median: how far apart the quartiles of what the markers tell may be
 
 
-def loaded_end(s: Seen, found: Held) -> tuple[str, float] | None:
-    """The free end that carries a mass, and this mass in masses of 1 m of the rope; None where no end does."""
+def free_end(found: Held) -> str | None:
+    """The end that nothing holds, "start" or "end"; None where both or none are held."""
     pins = found.rope.get("pinned", [])
     ends = {at for at, k in (("start", 0), ("end", -1)) if f"clamp_{at}" in found.rope or k in pins}
     ends |= {grip["at"] for grip in found.grips}
     if len(ends) != 1:
         return None
-    free = "end" if "start" in ends else "start"
+    return "end" if "start" in ends else "start"
+
+
+def loaded_end(s: Seen, found: Held) -> tuple[str, float] | None:
+    """The free end that carries a mass, and this mass in masses of 1 m of the rope; None where no end does."""
+    free = free_end(found)
+    if free is None:
+        return None
     mass = end_load(s, found.order if free == "end" else found.order[::-1])
     return None if mass is None else (free, mass)
 

@@ -16,7 +16,7 @@ from .seen import CALM, Seen, motion_of
 from .text import joined
 
 Array = np.ndarray
-NAMES = ("hand", "grip", "wrist", "clamp", "robot", "holder", "finger")
+NAMES = ("hand", "grip", "wrist", "clamp", "vise", "fixture", "robot", "holder", "finger")
 SMOOTHING, ALONE = 0.06, 0.12  # s, of recorded grips; of one that has one marker
 STIFF = 0.75  # of the next chord's: how much the direction at an end varies at most in a clamp; a pin has 1 or more
 NEAR = 1.5  # times the distance of neighbors on the rope: how near its first marker is to the second
@@ -25,6 +25,7 @@ PARTS = 2.0  # of these distances: by so much that of such a body changes at lea
 TURNS = 2.0  # times what it does move: how far a marker in a clamp would move if the rope turned there
 UNSURE = 0.6  # times the noise: so much motion cannot be told from it
 LEAST = 1e-4  # m, taken as the noise where there is less
+BEYOND = 0.1  # of what the other end moves: an end that moves less, and does not stay, is beside a clamp
 FIRST = 0.03  # s: an end that moves so much earlier than the other one moves the rope
 HIGHER = 0.1  # of the distance of the ends: so much higher is the one that holds the rope, where neither stays
 
@@ -187,9 +188,17 @@ def _still_end(s: Seen, found: Held, at: str, way: tuple[int, ...]) -> None:
     if direction is not None:
         found.rope[f"clamp_{at}"] = direction
         found.notes.append(f"{names[way[0]]} stays in place and the rope keeps its direction there: a clamp")
+        found.unknown.append(
+            f"where the clamp ends: at {names[way[0]]}, it is taken. EI goes with the third or fourth power of the "
+            f"free length: measure how far {names[way[0]]} is from where the clamp ends"
+        )
     else:
         found.rope.setdefault("pinned", []).append(0 if at == "start" else -1)
         found.notes.append(f"{names[way[0]]} stays in place and the rope turns there: it is pinned")
+        found.unknown.append(
+            f"whether {names[way[0]]} is where the rope is held: if a clamp holds it farther out, EI comes out wrong. "
+            "Put a marker where the clamp ends"
+        )
 
 
 def _gripped_end(s: Seen, found: Held, at: str, way: tuple[int, ...]) -> None:
@@ -286,25 +295,36 @@ def _guessed(s: Seen, found: Held) -> str:
     moves less."""
     r, (first, last) = s.recording, (found.order[0], found.order[-1])
     starts = [_leaves(s, k) for k in (first, last)]
-    if s.rest and abs(starts[0] - starts[1]) > FIRST:
-        at, k = ("start", first) if starts[0] < starts[1] else ("end", last)
+    height = mean_position(r.positions) @ (-s.gravity / np.linalg.norm(s.gravity))
+    rise = height[first] - height[last]
+    spread = np.nanvar(r.positions, axis=0).sum(axis=1)
+    k, other = (first, last) if starts[0] < starts[1] else (last, first)
+    lower = abs(rise) > HIGHER * float(s.apart[first, last]) and height[k] < height[other]
+    # a lower end that moves first, and more than the upper one, was let go
+    if s.rest and abs(starts[0] - starts[1]) > FIRST and not (lower and spread[k] > spread[other]):
+        at = "start" if k == first else "end"
         found.notes.append(f"{r.markers[k]} is the end that moves first")
         found.unknown.append(
             f"what holds the rope: no marker stays or has a name such as hand or grip, so {r.markers[k]}, the end that "
             "moves first, is taken"
         )
         return at
-    height = mean_position(r.positions) @ (-s.gravity / np.linalg.norm(s.gravity))
-    rise = height[first] - height[last]
     if abs(rise) > HIGHER * float(s.apart[first, last]):
         at, why = ("start" if rise > 0 else "end"), "the upper end"
     else:
-        spread = np.nanvar(r.positions, axis=0).sum(axis=1)
         at, why = ("start" if spread[first] < spread[last] else "end"), "the end that moves less"
     k = first if at == "start" else last
     found.unknown.append(
         f"what holds the rope: no marker stays or has a name such as hand or grip, so {r.markers[k]}, {why}, is taken"
     )
+    other = last if k == first else first
+    if spread[k] < BEYOND**2 * spread[other]:
+        share = np.sqrt(spread[k] / spread[other])
+        found.unknown.append(
+            f"what holds the rope beyond {r.markers[k]}, which moves by only {share:.0%} of what {r.markers[other]} "
+            f"does: it is likely a clamp that no marker shows. The model lets the rope turn at {r.markers[k]}, and EI "
+            "then comes out wrong. Put a marker where the clamp ends"
+        )
     return at
 
 

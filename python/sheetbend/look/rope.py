@@ -35,13 +35,18 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     if not s.static and len(takes) == 1 and (let_go := released(s, order)) is not None:
         return _while_held(takes[0], measured, let_go)
     check_one_rope(s, order)
-    found = _holding(s, hands, order)
+    hanging = measured.weight is not None
+
+    def holding(s: Seen, hands: Hands, order: tuple[int, ...]) -> Held:
+        return _at_rest(s, order, hanging) if s.static else held(s, hands, order)
+
+    found = holding(s, hands, order)
     if len(found.order) < 3:
         return None
     pushed = None
     if s.rest and not s.static and not found.grips and len(takes) == 1:
         takes, pushed = _free(takes[0], found)
-    rope = model_of(marked_by(takes, found, _holding), order, measured, pushed)
+    rope = model_of(marked_by(takes, found, holding), order, measured, pushed)
     kind = "a rope at rest" if s.static else "a rope"
     return Description(kind, notes_of(rope), unknown_of(rope), lines_of(rope))
 
@@ -92,13 +97,21 @@ def _free(take: Take, found: Held) -> tuple[list[Take], str | None]:
     return [replace(take, seen=replace(s, recording=r.piece(start), rest=0.0))], said
 
 
-def _holding(s: Seen, hands: Hands, order: tuple[int, ...]) -> Held:
-    return _at_rest(s, order) if s.static else held(s, hands, order)
-
-
-def _at_rest(s: Seen, order: tuple[int, ...]) -> Held:
-    """Both ends of a shape at rest in clamps."""
+def _at_rest(s: Seen, order: tuple[int, ...], hanging: bool) -> Held:
+    """Both ends of a shape at rest in clamps, or the upper one alone."""
     mean = mean_position(s.recording.positions)
     clamps = {"clamp_start": snapped(tangent(mean, order)), "clamp_end": snapped(-tangent(mean, order[::-1]))}
-    unknown = ["how the ends are held: both are taken as clamps at the first and last marker, whose angles are fitted"]
-    return Held(order, clamps, notes=["nothing moves: a shape at rest"], unknown=unknown)
+    notes = ["nothing moves: a shape at rest"]
+    if hanging:
+        upper, free = ("start", "end") if (mean[order[-1]] - mean[order[0]]) @ s.gravity > 0 else ("end", "start")
+        del clamps[f"clamp_{free}"]
+        first = s.recording.markers[order[0 if upper == "start" else -1]]
+        notes.append(f"its upper end, {first}, is held, and the other one hangs, as --weight says")
+        return Held(
+            order, clamps, notes=notes, unknown=[f"how {first} is held: in a clamp there, whose angle is fitted"]
+        )
+    unknown = [
+        "how the ends are held: both are taken as clamps at the first and last marker, whose angles are fitted. If the "
+        "lower one hangs free, give what it carries with --weight, in kg (0 if nothing)"
+    ]
+    return Held(order, clamps, notes=notes, unknown=unknown)

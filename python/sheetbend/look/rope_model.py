@@ -11,7 +11,7 @@ import numpy as np
 from ..arrays.timeseries import mean_position
 from ..errors import RecordingError
 from .beginning import lets_go
-from .end_load import loaded_end
+from .end_load import free_end, loaded_end
 from .held import Held
 from .line import plane, snapped
 from .marked import Marked
@@ -34,11 +34,12 @@ class Known(NamedTuple):
 
 
 class Load(NamedTuple):
-    """A mass at the end `at` of a rope, kg, and in masses of 1 m of it."""
+    """A mass at the end `at` of a rope, kg, and in masses of 1 m of it; whether it was weighed."""
 
     at: str
     mass: float
     meters: float
+    weighed: bool = False
 
 
 class Start(NamedTuple):
@@ -63,6 +64,7 @@ class RopeModel:
         start: how it begins.
         estimated: whether the fit estimates the true motion of what moves it.
         load: at its free end.
+        weighed: whether it was told what hangs there, if only nothing.
     """
 
     marked: Sequence[Marked]
@@ -75,6 +77,12 @@ class RopeModel:
     start: Start
     estimated: bool
     load: Load | None
+    weighed: bool
+
+    @property
+    def hangs_unknown(self) -> bool:
+        """Whether nothing tells if a mass hangs at its free end: a stiff rope's motion alone does not."""
+        return not self.weighed and self.load is None and not self.seen.static and free_end(self.held) is not None
 
     @property
     def seen(self) -> Seen:
@@ -114,7 +122,6 @@ def model_of(marked: Sequence[Marked], order: tuple[int, ...], measured: Measure
     in_space = not s.static and normal is None
     rod = in_space and _can_be_rod(s, found)
     start = Start({"points": "recording"}, []) if s.static else _start(s, found, rod)
-    load = None if s.static else loaded_end(s, found)
     return RopeModel(
         marked,
         [s.recording.markers[k] for k in order],
@@ -125,8 +132,20 @@ def model_of(marked: Sequence[Marked], order: tuple[int, ...], measured: Measure
         rod=rod,
         start=start if pushed is None else start._replace(said=[pushed]),
         estimated=rod and _estimates_hand(takes, found),
-        load=None if load is None else Load(load[0], load[1] * density.value, load[1]),
+        load=_load(s, found, density.value, measured.weight),
+        weighed=measured.weight is not None,
     )
+
+
+def _load(s: Seen, found: Held, density: float, weight: float | None) -> Load | None:
+    """What hangs at the free end: as weighed, or as the motion shows it."""
+    if weight is not None:
+        at = free_end(found)
+        if at is None:
+            raise RecordingError("weight", "hangs at a free end, and both ends are held", weight, "leave it out")
+        return Load(at, weight, weight / density, weighed=True) if weight else None
+    load = None if s.static else loaded_end(s, found)
+    return None if load is None else Load(load[0], load[1] * density, load[1])
 
 
 def _length(s: Seen, longest: Marked, measured: Measured) -> Known:

@@ -136,7 +136,7 @@ def _parameters(rope: RopeModel) -> list[str]:
     lines: list[str] = []
     for name, limits in _limits(rope).items():
         lines += table(f"[parameters.{name}]", limits)
-    if rope.load is not None:
+    if rope.load is not None and not rope.load.weighed:
         lines += table("[parameters.end_mass]", {"lower": 0.2 * rope.load.mass, "upper": 5.0 * rope.load.mass})
     for name, sd in rope.held.priors.items():
         lines += table(f"[parameters.rope_{name}]", {"prior": [0.0, sd]})
@@ -164,7 +164,7 @@ def _limits(rope: RopeModel) -> dict[str, dict[str, Any]]:
         found["rope_twist_damping"] = {"tied_to": "rope_bend_damping"}
     if rope.flat is not None:
         found |= {f"rope_set_{k}": {"prior": [0.0, round(SET_SD / k**1.5, 4)]} for k in SET_MODES}
-        for end in ("start", "end"):
+        for end in (end for end in ("start", "end") if f"clamp_{end}" in rope.held.rope):
             found[f"rope_{end}_angle"] = {"private": True, "lower": -0.785, "upper": 0.785, "prior": [0.0, HOLDER_SD]}
     return found
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..quantities.wording import short
 from .held import Held
 from .marked import said_of
 from .rope_model import ROUND, RopeModel
@@ -28,7 +29,12 @@ UNLOADED = (
 )
 LOAD = (
     "how the mass at the free end is attached: it is a point at the last marker, which turns freely. If you "
-    "weighed it, correct `mass` in [[scene.point_mass]] and remove [parameters.end_mass]"
+    "weighed it, give --weight"
+)
+WEIGHED = "how the weight at the free end is attached: it is a point at the last marker, which turns freely"
+STIFF = (
+    "whether something hangs at the free end. The model has nothing there; if a weight does, give its mass in kg with "
+    "--weight"
 )
 
 
@@ -44,7 +50,8 @@ def notes_of(rope: RopeModel) -> list[str]:
     said += rope.start.said
     if rope.load is not None:
         meters = f"{rope.load.meters:.2g}"
-        said.append(f"its free end carries a mass, some {meters} times that of 1 m of the rope: it is fitted")
+        counted = f"{short(rope.load.mass)} kg, as given" if rope.load.weighed else "it is fitted"
+        said.append(f"its free end carries a mass, some {meters} times that of 1 m of the rope: {counted}")
     return [*said, *said_of(rope.marked)[0], *rope.held.notes]
 
 
@@ -60,7 +67,9 @@ def unknown_of(rope: RopeModel) -> list[str]:
     if rope.keeps_roll:
         said.append(SPIN)
     if rope.load is not None:
-        said.append(LOAD)
+        said.append(WEIGHED if rope.load.weighed else LOAD)
+    elif rope.hangs_unknown:
+        said.append(STIFF)
     return said + said_of(rope.marked)[1]
 
 

@@ -42,11 +42,13 @@ class Measured:
         density: kg/m of a rope or beam, kg/m^2 of a cloth.
         length: m, of a rope or beam.
         poses: of the robot's tool that holds a cloth.
+        weight: kg, of what hangs at the free end of a rope; 0 of an end that is free and carries nothing.
     """
 
     density: float | None = None
     length: float | None = None
     poses: Poses | None = None
+    weight: float | None = None
 
 
 class Description(NamedTuple):

@@ -19,6 +19,7 @@ from ..errors import MeshError
 from ..files.door import note, reading
 from ..files.units import METERS
 from ..optional import require
+from .alike import turned_alike
 from .triangle_mesh import TriangleMesh
 from .unfold import unfold
 from .validate import checked_triangles, refuse_broken, signed_areas
@@ -56,7 +57,8 @@ def read_mesh(
         unit: of the file's positions, "m", "cm", "mm", "in" or "ft".
         texture_size: m per unit of texture coordinates, one number or (u, v).
         warp: (3,) direction of warp for "unfold".
-        merge: make one vertex of those at equal positions, as exporters split them where normals differ.
+        merge: mend what exporters leave: make one vertex of those at equal positions, as they are split where normals
+            differ, leave out vertices without a triangle, and turn triangles that face against the others.
 
     Warns:
         UserWarning: for each of the mesh's `doubts`, for triangles left out, and for a size that suggests another unit.
@@ -88,6 +90,9 @@ def _mesh(
     if not whole.all():
         triangles, texture = triangles[whole], None if texture is None else texture[whole]
         said.append(f"{(~whole).sum()} triangles that name a vertex twice are left out.")
+    if merge and len(triangles):
+        vertices, triangles, texture, mended = _mended(vertices, triangles, texture)
+        said += mended
     for doubt in filter(None, said):
         warnings.warn(f"{path.name}: {doubt}", stacklevel=3)
     triangles = checked_triangles(triangles, len(vertices))
@@ -192,6 +197,26 @@ def _merged(vertices: Array, triangles: NDArray[np.int64]) -> tuple[Array, NDArr
     rank = np.empty(len(first), dtype=np.int64)
     rank[np.argsort(first)] = np.arange(len(first))
     return vertices[np.sort(first)], rank[index.ravel()][triangles]
+
+
+def _mended(
+    vertices: Array, triangles: NDArray[np.int64], texture: Array | None
+) -> tuple[Array, NDArray[np.int64], Array | None, list[str]]:
+    """A mesh without unused vertices, whose triangles face one way, and sentences on both."""
+    said = []
+    turned = turned_alike(triangles)
+    if len(turned):
+        triangles = triangles.copy()
+        triangles[turned] = triangles[turned][:, ::-1]
+        if texture is not None:
+            texture = texture.copy()
+            texture[turned] = texture[turned][:, ::-1]
+        said.append(f"{len(turned)} triangles that face against the others are reversed.")
+    used, renumbered = np.unique(triangles, return_inverse=True)
+    if len(used) < len(vertices):
+        said.append(f"vertices without a triangle are left out: {len(vertices) - len(used)}.")
+        vertices, triangles = vertices[used], renumbered.reshape(-1, 3)
+    return vertices, triangles, texture, said
 
 
 def _scaled_texture(path: Path, corners: Array, texture: Array | None, size: float | ArrayLike) -> Array:

@@ -108,11 +108,11 @@ def refuse_broken(triangles: Indices, count: int) -> None:
     if len(flipped):
         on_it = (np.flatnonzero((directed == flipped[0]).all(axis=1)) // 3).tolist()
         problem = f"are oriented against each other along the edge {flipped[0].tolist()} ({_more(flipped)})"
-        raise MeshError("triangles", problem, on_it, "reverse the corners of one of the two, or unify the normals")
+        raise MeshError("triangles", problem, on_it, "unify the normals where it is made, or read it with `merge`")
     unused = np.setdiff1d(np.arange(count), triangles)
     if unused.size:
         problem = f"belong to no triangle ({unused.size} of {count})"
-        raise MeshError("vertices", problem, unused[:5].tolist(), "remove them and renumber the triangles")
+        raise MeshError("vertices", problem, unused[:5].tolist(), "remove them, or read it with `merge`")
     _refuse_touching_fans(triangles, count)
 
 

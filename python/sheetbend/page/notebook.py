@@ -20,7 +20,7 @@ from .of_fit import fit_page, result_page
 from .of_motion import motion_page
 from .shown import Shown, of_positions, of_recording, of_trajectory
 
-HEIGHT = 640  # pixels
+HEIGHT, OF_FIT = 780, 1060  # pixels: the motion with its legend, below a recording's summary or a fit's tables
 
 
 def show_in_notebooks() -> None:
@@ -30,10 +30,10 @@ def show_in_notebooks() -> None:
     not know its scene.
     """
     for kind, page in _PAGES.items():
-        kind._repr_html_ = _framed(page)
+        kind._repr_html_ = _framed(page, OF_FIT if kind in (Fit, FitResult) else HEIGHT)
 
 
-def _framed(page: Callable[[Any], str | None]) -> Callable[[Any], str | None]:
+def _framed(page: Callable[[Any], str | None], height: int) -> Callable[[Any], str | None]:
     def repr_html(self: Any) -> str | None:
         try:
             text = page(self)
@@ -41,7 +41,7 @@ def _framed(page: Callable[[Any], str | None]) -> Callable[[Any], str | None]:
             return None
         if text is None:
             return None
-        style = f"width:100%;height:{HEIGHT}px;border:0"
+        style = f"width:100%;height:{height}px;border:0"
         return f'<iframe style="{style}" srcdoc="{html.escape(text)}"></iframe>'
 
     return repr_html

@@ -20,6 +20,7 @@ from .root import root
 GRAVITY = 9.81
 _CHORD_GAMMA = 8.004197  # weight * length^3 / rigidity at a chord of 41.5 degrees, of an inextensible strip
 _HELD = 2  # cells on the platform
+_MOST_ACROSS = 40  # cells: a strip that bends within millimeters has longer cells across than along
 
 
 @dataclass(frozen=True)
@@ -63,13 +64,16 @@ def cantilever(
     stiff = fabric.bending_weft if along == "weft" and fabric.bending_weft is not None else fabric.bending
     guess = (_CHORD_GAMMA * stiff / (fabric.density * GRAVITY)) ** (1.0 / 3.0)
 
+    # a mesh of one number of cells, whatever the length: its inputs are compared below
+    across = min(max(2, round(width * (cells + 0.5) / guess)), _MOST_ACROSS)
+
     def measure(length: float) -> tuple[float, float, tuple[Equilibrium, dict[str, float], float]]:
-        rest = equilibrium(_scene(fabric, along, length, width, cells))
+        rest = equilibrium(_scene(fabric, along, length, width, (cells, across)))
         chord, bar = _chord(rest)
         inputs_bar = rest.input_gradient(bar)
         # the inputs are simple functions of the length, so a difference of them will do
         h = 1e-5 * length
-        longer, shorter = (_scene(fabric, along, length + d, width, cells).compiled.inputs() for d in (h, -h))
+        longer, shorter = (_scene(fabric, along, length + d, width, (cells, across)).compiled.inputs() for d in (h, -h))
         by_length = float(inputs_bar @ (longer - shorter)) / (2.0 * h)
         return chord / math.radians(angle) - 1.0, by_length / math.radians(angle), (
             rest, rest.by_name(inputs_bar), by_length
@@ -89,10 +93,12 @@ def cantilever(
     )
 
 
-def _scene(fabric: Fabric, along: str, length: float, width: float, cells: int) -> Scene:
-    """The strip, flat. A clamp acts in the middle of the cell between held and free vertices: the edge lies there."""
+def _scene(fabric: Fabric, along: str, length: float, width: float, counts: tuple[int, int]) -> Scene:
+    """The strip, flat, with so many cells along the overhang and across. A clamp acts in the middle of the cell between
+    held and free vertices: the edge lies there."""
+    cells, across = counts
     cell = length / (cells + 0.5)
-    mesh = grid((cells + _HELD) * cell, width, cells + _HELD, max(2, round(width / cell)), pattern="one_way")
+    mesh = grid((cells + _HELD) * cell, width, cells + _HELD, across, pattern="one_way")
     held = mesh.within((-1.0, -1.0, -1.0), ((_HELD + 0.5) * cell, 2.0 * width, 1.0))
     scene = Scene("cantilever", gravity=(0.0, 0.0, -GRAVITY))
     at = mesh.vertices - [(_HELD - 0.5) * cell, width / 2.0, 0.0]

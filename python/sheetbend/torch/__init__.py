@@ -1,8 +1,8 @@
 """PyTorch: rollouts and equilibria as differentiable functions of tensors, and a Module that learns named quantities.
 
-The only part of sheetbend that imports torch. Everything here is float64 on the CPU, and works with autograd (rollouts
-twice, equilibria once) and with torch.func: grad, vjp, jvp, vmap, jacrev, jacfwd, hessian. Arrays pass between torch
-and the core without copies.
+The only part of sheetbend that imports torch. Everything here is computed in float64 on the CPU; tensors of float32 are
+taken, and give results of float32. It works with autograd (rollouts twice, equilibria once) and with torch.func: grad,
+vjp, jvp, vmap, jacrev, jacfwd, hessian. Arrays of float64 pass between torch and the core without copies.
 """
 
 from ..optional import require

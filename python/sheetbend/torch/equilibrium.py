@@ -15,7 +15,7 @@ from ..motion.core_terms import forces_by_group, pressures_by_volume
 from ..motion.equilibrium import whole_start
 from ..scene.scene import Scene
 from .function import respond
-from .inputs import InputMap
+from .inputs import InputMap, dtype_of
 
 Array = np.ndarray
 
@@ -96,6 +96,8 @@ def equilibrium(
     Once: second derivatives raise NotImplementedError. A batch is one call of the core, which spreads the scenes over
     threads: each takes its own steps, so they share no vector.
 
+    The result is float32 if all tensors given are float32, else float64; everything is computed in float64.
+
     Args:
         scene: is frozen by this.
         start: (particles, 3) m, or (nodes, 3) m as of `sheetbend.simulate`, not differentiated; the scene's initial
@@ -116,6 +118,7 @@ def equilibrium(
     batch, dofs = flat.shape[:-1], scene.compiled.core.dofs
     equilibria = Equilibria(scene, x, stable, threads, tuple(inputs or ()))
     states = respond(equilibria, flat.reshape(-1, flat.shape[-1])).reshape(*batch, -1)
+    states = states.to(dtype_of(values or {}, inputs or {}))
     multipliers: Any = states[..., dofs:]  # slices and reshapes only, so tensors pass
     forces, pressures = forces_by_group(scene, multipliers), pressures_by_volume(scene, multipliers)
     nodes = states[..., :dofs].reshape(*batch, -1, 3)

@@ -92,7 +92,7 @@ class InputMap:
         """Quantities (*batch,) and arrays (*batch, ...), whose batch dimensions broadcast, to (*batch, total).
 
         Raises:
-            InputError: unknown name, not a tensor, not float64, not on the CPU, wrong shape, batches that do not
+            InputError: unknown name, not a tensor, no floating type, not on the CPU, wrong shape, batches that do not
                 broadcast, arrays without effect in this scene, values outside the range of their quantity.
         """
         batches = {name: self._batch_of_value(name, value) for name, value in values.items()}
@@ -105,13 +105,16 @@ class InputMap:
         for name, (offset, size) in self._layout.items():
             start, own = offset, self._given[name][1]
             if name in arrays:
-                parts.append(arrays[name].reshape(*batches[name], own).expand(*batch, own))
+                parts.append(arrays[name].double().reshape(*batches[name], own).expand(*batch, own))
                 start += own  # hidden nodes stay
             parts.append(flat[..., start : offset + size])
         return torch.cat(parts, -1)
 
     def _batch_of_value(self, name: str, value: Tensor | float) -> tuple[int, ...]:
         field = f"values.{name}"
+        if name not in self._names and name in self._layout:
+            fix = f"give it in `inputs`: inputs={{{name!r}: ...}}"
+            raise InputError(field, "is an input array of the scene, and no quantity", name, fix)
         if name not in self._names:
             raise InputError(field, "is no quantity of the scene", name, choices(name, self._names))
         return () if isinstance(value, int | float) else _dense(field, value)
@@ -138,6 +141,12 @@ class InputMap:
         rows = theta.reshape(-1, len(each))
         out: Tensor = _Checked.apply(self._domain.check_quantities, rows)  # type: ignore[no-untyped-call]
         return out.reshape(theta.shape)
+
+
+def dtype_of(values: Mapping[str, Tensor | float], arrays: Mapping[str, Tensor]) -> torch.dtype:
+    """What comes of these: float32 where all tensors are, else float64."""
+    own = {t.dtype for t in (*values.values(), *arrays.values()) if isinstance(t, Tensor)}
+    return torch.float32 if own == {torch.float32} else torch.float64
 
 
 class _Checked(Function):
@@ -178,13 +187,14 @@ def _without_effect(scene: Scene) -> dict[str, str]:
 
 
 def _dense(field: str, tensor: object) -> tuple[int, ...]:
-    """The shape of a dense float64 tensor on the CPU, or an error that says what else it is."""
+    """The shape of a dense tensor of floats on the CPU, or an error that says what else it is."""
     if not isinstance(tensor, Tensor):
-        raise InputError(field, "is not a tensor", type(tensor).__name__, "give a torch tensor of float64")
+        fix = "give a torch tensor of float64 or float32"
+        raise InputError(field, "is not a tensor", type(tensor).__name__, fix)
     if tensor.device.type != "cpu":
         raise InputError(field, "is not on the CPU", str(tensor.device), "move it there with .cpu()")
-    if tensor.dtype != torch.float64:
-        raise InputError(field, "is not float64", str(tensor.dtype), "convert it with .double()")
+    if tensor.dtype not in (torch.float64, torch.float32):
+        raise InputError(field, "is not float64 or float32", str(tensor.dtype), "convert it with .double()")
     if tensor.layout != torch.strided:
         raise InputError(field, "is not dense", str(tensor.layout), "convert it with .to_dense()")
     return tuple(tensor.shape)

@@ -15,7 +15,7 @@ from ..motion.rollouts import Rollouts
 from ..motion.solver import Solver
 from ..scene.scene import Scene
 from .function import respond
-from .inputs import InputMap
+from .inputs import InputMap, dtype_of
 
 
 class Simulation:
@@ -39,7 +39,7 @@ class Simulation:
         keep_tape = torch.is_grad_enabled() and flat.requires_grad
         own = None if lengths is None else _checked(lengths, batch, len(self._steps))
         rollouts = Rollouts(self.scene, self._core, self._steps, keep_tape, self.solver, own, tuple(inputs or ()))
-        states = respond(rollouts, flat.reshape(-1, flat.shape[-1]))
+        states = respond(rollouts, flat.reshape(-1, flat.shape[-1])).to(dtype_of(values or {}, inputs or {}))
         return states.reshape(*batch, len(self._steps), -1, 3)[..., : self._shown, :]
 
 
@@ -81,7 +81,8 @@ def simulate(
             them: the axes of bodies and the directors of rods are among these.
 
     Returns:
-        (*batch, frames, particles, 3) m, or (*batch, frames, nodes, 3) m, float64.
+        (*batch, frames, particles, 3) m, or (*batch, frames, nodes, 3) m. float32 if all tensors given are float32,
+        else float64; everything is computed in float64.
 
     Raises:
         InputError: times off the grid; lengths that fit neither batch nor frames; a budget below the least that works;

@@ -11,6 +11,8 @@ from torch import Tensor
 from torch.utils import _pytree as pytree
 from torch.utils.data._utils.collate import default_collate_fn_map
 
+from ..errors import InputError
+
 _WHOLE = 2  # numbers at the end of a row: the substep, and what an impact has left
 
 
@@ -84,7 +86,14 @@ class State:
 
     @staticmethod
     def stack(states: Sequence[State]) -> State:
-        """A batch of states of the same scene; it gets a new first dimension."""
+        """A batch of states of the same scene; it gets a new first dimension.
+
+        Raises:
+            InputError: no states, or states of different scenes.
+        """
+        if len({state.numbers.shape for state in states}) != 1:
+            got = [tuple(state.numbers.shape) for state in states]
+            raise InputError("states", "do not make a batch", got, "give one state or more, all of one scene")
         return State(torch.stack([state.numbers for state in states]), states[0].dtype, states[0].hidden)
 
     def _of_particles(self, i: int) -> Tensor:
@@ -108,3 +117,4 @@ pytree.register_pytree_node(
     serialized_type_name="sheetbend.torch.State",
 )
 default_collate_fn_map[State] = _collated
+torch.serialization.add_safe_globals([State])  # so that torch.load reads it as it reads tensors
