@@ -11,7 +11,8 @@
     `unexplained`.
 4.  Do parts of the data contradict each other? `beginnings`: of motions; `contradictions`: separate parts, another
     start, motion that was held out; `missing_force`: flights.
-5.  Were the recordings read right? `misread`: axes, units, order of markers; `lost_frames`; `implausible`: units of
+5.  Were the recordings read right? `misread`: axes, units, order of markers; `misread_forces`;
+    `lost_frames`; `implausible`: units of
     what was given.
 6.  What does it rest on? `given`: what an error of each given value moves. `told` lists these values and what an
     error of each changes, with `told_words`, `tangents` and `told_inputs` (errors that change inputs of a scene). Some

@@ -117,9 +117,11 @@ def beyond_chance(chance: Callable[[Array | None], float], tests: int, errors: C
     return not errors().size or chance(errors()) < LEVEL_OF_DRIVEN
 
 
-def of_what_is_left(r: Array, J: Array, mine: Array, layout: Layout, cause: Cause, errors: Array | None) -> float:
+def of_what_is_left(
+    r: Array, J: Array, mine: Array, layout: Layout, taken: float, cause: Cause, errors: Array | None
+) -> float:
     """Chance of a cause where all that a fit leaves, and how alike it is, counts as noise (`chance_of`)."""
-    return chance_of(r, J, [column for *_, column in cause.parts], mine, layout, errors)
+    return chance_of(r, J, [column for *_, column in cause.parts], mine, layout, errors, taken)
 
 
 def of_noise(q: Array, white: float, cause: Cause, errors: Array | None) -> float:

@@ -56,7 +56,8 @@ def cloth_sizes(problem: FitProblem, u: Array, i: int) -> list[Told]:
     if not directions:
         return []
     try:
-        columns = dict(zip(added, tangents(problem, u, i, added).T, strict=True))
+        corrected = problem.corrections(u).get(e.name)
+        columns = dict(zip(added, tangents(problem, u, i, added, corrected=corrected).T, strict=True))
     except SheetbendError:
         return []
     return [

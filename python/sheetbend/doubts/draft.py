@@ -34,7 +34,7 @@ def drafts(problem: FitProblem, u: Array, i: int, inputs: Array) -> tuple[FitPro
     Raises:
         SheetbendError: the motion has no answer there.
     """
-    e, recording = problem.experiments[i], problem.recordings[i]
+    e, recording = problem.experiment_at(i, u), problem.recordings[i]
     if e.static or not e.scene.has_drag or any(name.startswith(WIND) for name in e.scene.quantities):
         return problem, []
     values = problem.values_of(e, u)
@@ -54,7 +54,7 @@ def drafts(problem: FitProblem, u: Array, i: int, inputs: Array) -> tuple[FitPro
     slot = {p: k for k, p in enumerate(forces.particles)}
     slots = np.array([slot[p] for p in particles.tolist()])
     where = np.arange(len(times))[:, None] * len(slot) + slots
-    per_speed = _per_speed(problem.experiment_at(i, u), values, times, drag[:, particles], particles)
+    per_speed = _per_speed(e, values, times, drag[:, particles], particles)
     entries = (3 * where[..., None] + np.arange(3)).ravel()
     return made, [("force", entries, per_speed[..., axis].ravel()) for axis in range(3)]
 

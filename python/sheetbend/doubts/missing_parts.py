@@ -24,12 +24,13 @@ from .told import Told
 def missing_parts(problem: FitProblem, u: Array, i: int) -> list[Told]:
     """Directions of what the i-th experiment's model does not have; none where its motion has no answer at u (free,).
     Takes two sets of tangents."""
-    e = problem.experiments[i]
+    e = problem.experiment_at(i, u)
     made = [with_losses(e) if k == i else other for k, other in enumerate(problem.experiments)]
     theta, slots, _ = problem.known(u)
     parts = list(_parts(e, e.scene.compiled.inputs(theta[slots[i]])))
+    corrected = problem.corrections(u).get(e.name)
     try:
-        columns = tangents(problem.of(made), u, i, {label: added for label, added, _ in parts})
+        columns = tangents(problem.of(made), u, i, {label: added for label, added, _ in parts}, corrected=corrected)
     except SheetbendError:
         return []
     return [

@@ -65,15 +65,23 @@ def two_directions(r: Array, beside: Array, left: float, one: float, least: floa
     ]
 
 
-def chance_of(r: Array, J: Array, columns: Sequence[Array], mine: Array, layout: Layout, errors: Array | None) -> float:
+def chance_of(
+    r: Array,
+    J: Array,
+    columns: Sequence[Array],
+    mine: Array,
+    layout: Layout,
+    errors: Array | None,
+    taken: float = 0.0,
+) -> float:
     """Chance that a right model asks for a column, or for the less sure of two beside each other; 1 where it asks for
-    none. No step of the parameters, J (rows, p), lowers the residuals r (rows,)."""
+    none. No step of the parameters, J (rows, p), lowers the residuals r (rows,). Other arguments: `asked_for`."""
     chances = []
     for k, column in enumerate(columns):
         after, beside = r, J
         for other in [*columns[:k], *columns[k + 1 :]]:
             beside = np.column_stack([beside, other])
             after = unexplained(beside, r, rcond=None)
-        asked = asked_for(after, beside, column, mine, layout, errors=errors)
+        asked = asked_for(after, beside, column, mine, layout, taken, errors)
         chances.append(1.0 if asked is None else asked.chance)
     return max(chances)

@@ -9,11 +9,13 @@ Where markers drive a scene, most of the motion is carried along by them, and a 
 to be explained is then the motion beside that of markers which move rigidly with the grips (`experiment.carried`).
 There a shape that is missed counts too, where it spoils the prediction: a model whose error is more than a third of
 that without physics, both in the fitted and in the held-out part, does not move as what was recorded.
+
+Forces and torques of a sensor are asked in the same way, the two apart.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +26,7 @@ from ..experiment.carried import Values, carried_baselines
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
 from ..statistics.white_noise import white_variance
+from .force_comparison import UNITS
 from .prediction import Comparison
 
 Mask = NDArray[np.bool_]
@@ -77,7 +80,7 @@ def unexplained(
     for c in comparisons:
         if c.experiment.static or c.experiment.predict is not None:
             continue
-        words = _words(c, alike, known) or _hardly_better(c, known)
+        words = _words(c, alike, known) or _hardly_better(c, known) or next(_of_forces(c), "")
         if words:
             found |= {name: words for name in problem.acting_on(c.experiment) if name not in found}
     return found
@@ -162,3 +165,23 @@ def _hardly_better(c: Comparison, values: Values) -> str:
         f"(markers carried by the grips; {c.baseline_words}), so the model hardly predicts it: the ends may be held "
         "otherwise, as in clamps where it lets them turn"
     )
+
+
+def _of_forces(c: Comparison) -> Iterator[str]:
+    """Why the forces or torques of a sensor count as unexplained."""
+    for one in c.forces:
+        for kind, (_, columns) in zip(("forces", "torques"), UNITS, strict=True):
+            y, x = one.measured[one.fitted][:, columns], one.simulated[one.fitted][:, columns]
+            counts = np.isfinite(y).any(axis=0)
+            y, x = y[:, counts], x[:, counts]
+            y, x = (each[np.isfinite(y).all(axis=1)] for each in (y, x))
+            if len(y) < 3 or not y.size:
+                continue
+            left, moved = (float(np.var(each, axis=0).sum()) for each in (y - x, y))
+            noise = white_variance(y[:-2], y[1:-1], y[2:])
+            if left > NOISY * noise and left - noise > MOST * (moved - noise) > 0.0:
+                missed = short(100 * (left - noise) / (moved - noise), 2)
+                yield (
+                    f"the fit leaves {missed} % of the variance over time of the {kind} of {one.sensor}, so it does "
+                    "not explain them; they may have another sign, axes or unit, or the model lacks something"
+                )

@@ -65,8 +65,8 @@ def wrong_given(
     Noise of what drives a scene hides a wrong number. So where much is left of a motion and no number explains nearly
     all of it, they are asked for what no other driven motion explains (`driven_span`).
     """
-    ok, r, J = problem.evaluate(u)
-    if not ok or not np.isfinite(J).all() or problem.estimates_corrections:
+    ok, r, J = problem.evaluate_exactly(u)
+    if not ok or not np.isfinite(J).all():
         return []
 
     lacking = Lacking(problem, u)
@@ -78,6 +78,8 @@ def wrong_given(
         return found
 
     found = asked()
+    if problem.estimates_corrections:
+        return found
     sure = {one.motions for one in found if one.sure}
     if _much_left(problem, u, sure) and (driven := driven_span(problem, u)).size:
         found = _surer(found, asked(driven))
@@ -132,6 +134,7 @@ def _asked(
     """The same, with known errors of the residuals (rows, errors) of any size taken out, and changes of what drives the
     scenes (rows, changes). These may have moved the parameters, too."""
     layout, data, count = problem.rows_layout(), problem.core.data_rows, J.shape[1]
+    taken = sum(map(problem.core.absorbed, range(len(problem.experiments))))
     for more in (known, driven):
         if more is not None:
             J = np.hstack([J, np.vstack([more, np.zeros((len(r) - data, more.shape[1]))])])
@@ -146,7 +149,7 @@ def _asked(
 
     def likely(tried: Sequence[tuple[Told, Array]], mine: Array, left: float, least: float) -> list[Cause]:
         white = max((float(r[mine] @ r[mine]) - left) / np.count_nonzero(mine), 1.0)
-        chance = partial(of_what_is_left, r, J, mine, layout) if least == MOST else partial(of_noise, q, white)
+        chance = partial(of_what_is_left, r, J, mine, layout, taken) if least == MOST else partial(of_noise, q, white)
         seen = seen_beside(q, tried)
         for two in (True, False) if least == MOST else (False,):  # where chance explains a second one, one may do
             explaining = causes(r, seen, left, least, two)
@@ -221,7 +224,10 @@ def _directions(
         for label, of in labels:
             _, column = each.setdefault(label, (of, np.zeros(rows)))
             column[first[one.experiment] : first[one.experiment + 1]][one.rows] += one.column
-    yield from each.values()
+    solved = problem.estimates_corrections  # what is solved for on the way takes up a part of each error
+    yield from (
+        (one, problem.core.reduced(by[: problem.core.data_rows]) if solved else by) for one, by in each.values()
+    )
 
 
 def doubts_of(problem: FitProblem, u: Array, judged: Identifiability, wrong: Sequence[Wrong]) -> dict[str, str]:

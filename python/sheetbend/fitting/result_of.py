@@ -15,6 +15,7 @@ from ..doubts.contradictions import doubtful, elsewhere, held_out_motion
 from ..doubts.implausible import implausible
 from ..doubts.leave_one_out import MEANING
 from ..doubts.misread import misread
+from ..doubts.misread_forces import misread_forces
 from ..doubts.prediction import Comparison
 from ..doubts.profiles import Elsewhere
 from ..doubts.stationary import unfinished
@@ -95,7 +96,7 @@ def result_of(
         *at.warnings,
         *pressed_in(at.problem, at.u, contacts),
         *outside(conclusion.experiments, conclusion.values),
-        *(() if interrupted else (*misread(problem, best.u), *implausible(problem))),
+        *(() if interrupted else (*misread(problem, best.u), *misread_forces(problem, best.u), *implausible(problem))),
     )
     found_fields = Fields(at.problem, at.u, fields)
     baselines = (c.baseline_words for c in (*comparisons, *left_out.values()) if c.baseline_words)
