@@ -110,9 +110,33 @@ def test_gradients_with_respect_to_friction_and_drag() -> None:
     add_arm(scene, "lower", pivot=upper, angle=-0.4, rate=1.0, friction=1e-3, viscosity=5e-5, drag=1e-5, **body)
     report = sb.check_gradients(scene, np.arange(6) * 0.01, sb.Solver(h=1.25e-3))
     assert {row.name for row in report.rows} >= {
-        f"{name}_{q}" for name in ("upper", "lower") for q in ("friction", "drag")
+        f"{name}_{q}" for name in ("upper", "lower") for q in ("friction", "slip_angle", "drag")
     }
     assert report.passed, str(report)
+
+
+def test_a_fit_says_what_a_slip_angle_that_nobody_measured_moves() -> None:
+    """The elastic part of dry friction speeds small swings up, which a length takes for its own. A fit that takes the
+    slip angle as given tells so, and one that does not is right."""
+    times, solver = np.arange(301) * 0.02, sb.Solver(h=0.02 / 16)
+    scene, arm = pendulum(angle=0.4, friction=1e-2, slip_angle=2e-4)
+    noise = np.random.default_rng(3).normal(0.0, 2e-5, (len(times), 1, 3)) * (1.0, 0.0, 1.0)
+    recording = sb.Recording(sb.simulate(scene, times, solver).positions[:, [arm.end]] + noise, times, markers=["end"])
+    start, body = pendulum(angle=0.39, friction=8e-3, slip_angle=2e-3)
+    options = {"sigma": 2e-5, "axes": "xz", "solver": solver, "markers": {"end": body.place(LENGTH)}}
+    names = ["arm_length", "arm_friction", "arm_angle"]
+    experiment = sb.Experiment(scene=start, recording=recording, **options)
+
+    def found(*more: str) -> sb.Fit:
+        return sb.fit([experiment], parameters=dict.fromkeys([*names, *more]), refine=None, profiles=False, windows=())
+
+    given, fitted = found(), found("arm_slip_angle")
+    (premise,) = (p for p in given.result.premises if p.name == "arm_slip_angle")
+    off = given["arm_length"].value - LENGTH
+    assert premise.words == "100 %" and off > given["arm_length"].half_width
+    assert premise.moved["arm_length"] == approx(off, rel=0.7)  # to first order
+    assert fitted["arm_length"].lower < LENGTH < fitted["arm_length"].upper
+    assert fitted["arm_slip_angle"].lower < 2e-4 < fitted["arm_slip_angle"].upper
 
 
 def test_a_twin_gives_its_friction_viscosity_and_drag_back() -> None:

@@ -112,7 +112,7 @@ def test_what_follows_markers_is_kept(tmp_path: Path) -> None:
 
 def test_limits_and_scales_are_kept(tmp_path: Path) -> None:
     scene = rope()
-    scene.add_quantity("tilt", 0.1, "rad", positive=False, scale=0.2, limits=(-1.0, np.inf))
+    scene.add_quantity("tilt", 0.1, "rad", positive=False, scale=0.2, limits=(-1.0, np.inf), unsure=0.5)
     sb.save_scene(scene, tmp_path / "a.scene")
     assert sb.load_scene(tmp_path / "a.scene").quantities["tilt"] == scene.quantities["tilt"]
 

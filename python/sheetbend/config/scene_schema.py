@@ -30,7 +30,8 @@ class Pendulum(Section):
 
     name: Name = key(
         "pendulum",
-        "prefix of its quantities: <name>_length, _mass, _angle, _rate, _hinge_viscosity, _friction, _drag",
+        "prefix of its quantities: <name>_length, _mass, _angle, _rate, _hinge_viscosity, "
+        "_friction, _slip_angle, _drag",
     )
     length: Finite = key(..., "from pivot to mass", "m", gt=0)
     mass: Finite = key(1.0, "of the point", "kg", gt=0)
@@ -50,7 +51,7 @@ class Arm(Section):
     name: Name = key(
         "arm",
         "prefix of its quantities: <name>_mass, _first_moment, _inertia, _length, _angle, _rate, _hinge_viscosity, "
-        "_friction, _drag",
+        "_friction, _slip_angle, _drag",
     )
     mass: Finite = key(..., "its mass", "kg", gt=0)
     first_moment: Finite = key(..., "mass times distance from pivot to center of mass", "kg m", gt=0)

@@ -164,7 +164,7 @@ def _collect(
 def _step(q: Quantity, value: float, log: bool) -> tuple[bool, float, str] | None:
     """Whether the step of a told quantity is relative, the step, and the step in words; None where none makes sense."""
     if log:
-        return True, 0.01, "1 %"
+        return True, q.unsure, f"{100 * q.unsure:g} %"
     if q.name.startswith(WIND):
         return (False, *GROUPS["draft"][1])
     if q.unit in STEPS:

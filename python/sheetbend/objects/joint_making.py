@@ -215,14 +215,15 @@ class Making:
         constrain(self.scene, kind, group, stencil, expressions(weights), compliance, damping, viscosity)
         return group
 
-    def name_stiffness(self, group: str, quantity: str, value: float, unit: str, at: float = 1.0) -> None:
+    def name_stiffness(self, group: str, quantity: str, value: float, unit: str, at: str | None = None) -> None:
         """Make a quantity of the stiffness that all constraints of a group have, which was given a compliance; or of
-        what they push with where they are strained by `at`."""
+        what they push with where they are strained by the quantity `at`."""
         own, first, _ = self.scene.group(group)
         own.compliance[:] = 0.0
         self.scene.add_quantity(quantity, value, unit)
         places = first + np.arange(len(own.compliance))
-        self.scene.add_terms([Term("compliance", places, at, ((quantity, "inverse"),))])
+        strained = () if at is None else ((at, "identity"),)
+        self.scene.add_terms([Term("compliance", places, 1.0, (*strained, (quantity, "inverse")))])
 
     def name_damping(self, group: str, quantity: str, value: float, unit: str) -> None:
         """Make a quantity of the damping that all constraints of a group have, which was given one of zero."""

@@ -18,7 +18,7 @@ from ..quantities.expression import Expression
 from ..quantities.quantities import Term
 from ..scene.scene import Array
 from .joint_making import Making
-from .pivot import check_friction
+from .pivot import add_slip_angle, check_friction
 
 Knots = tuple[ArrayLike, ArrayLike]  # times (knots,) s and values (knots,)
 MOST_NAMED = 50  # knots of a torque that are quantities
@@ -77,8 +77,9 @@ def add_friction(made: Making, friction: float | None, slip_angle: float) -> Non
     (stuck,) = made.scene.add_hidden(np.zeros((1, 3)), 1.0, pinned=True)
     _start(made, "position", int(stuck), "angle")
     weights, nodes = _turn(made, int(stuck))
-    group = made.constrain("joint_friction", "dry", nodes, [[*weights, slip_angle]], np.ones(1))
-    made.name_stiffness(group, f"{made.name}_friction", friction, "N m", slip_angle)
+    slip = add_slip_angle(made.scene, made.name, slip_angle)
+    group = made.constrain("joint_friction", "dry", nodes, [[*weights, Expression.of(slip)]], np.ones(1))
+    made.name_stiffness(group, f"{made.name}_friction", friction, "N m", at=slip)
 
 
 def hold_axis(made: Making, stiffness: float | None, damping: float | None) -> None:

@@ -21,6 +21,7 @@ from ..errors import SceneError
 from ..quantities.quantities import ZERO_OR_MORE, Term
 from ..scene.scene import Scene
 from .arm_data import Arm
+from .chain import first_value
 
 SLIP_ANGLE = 1e-3
 """How far a joint with dry friction gives before it slides unless told otherwise, rad."""
@@ -68,6 +69,7 @@ def _dry(scene: Scene, arm: Arm, carrier: Arm | None, before: int, friction: flo
     angles = [(1.0, arm)] if carrier is None else [(1.0, arm), (-1.0, carrier)]
     scene.add_terms([Term("position", 3 * int(stuck), sign, ((f"{a.name}_angle", "identity"),)) for sign, a in angles])
     quantity, group = scene.add_quantity(f"{arm.name}_friction", friction, "N m"), f"{arm.name}_friction_hinge"
+    slip = (add_slip_angle(scene, arm.name, slip_angle), "identity")
     scene.add_constraints(
         "friction_hinge",
         [(before, arm.pivot, arm.end, stuck)],
@@ -76,9 +78,16 @@ def _dry(scene: Scene, arm: Arm, carrier: Arm | None, before: int, friction: flo
         rest=[slip_angle],
         normal=(0.0, -1.0, 0.0),
     )
-    scene.groups[-1].compliance[:] = 0.0
-    _, first, _ = scene.group(group)
-    scene.add_terms([Term("compliance", first, slip_angle, ((quantity, "inverse"),))])
+    made, first, _ = scene.group(group)
+    made.compliance[:] = made.rest[:, -1] = 0.0  # terms make both
+    at = first_value(scene, group) + made.rest.size - 1
+    scene.add_terms([Term("compliance", first, 1.0, (slip, (quantity, "inverse"))), Term("rest", at, 1.0, (slip,))])
+
+
+def add_slip_angle(scene: Scene, name: str, slip_angle: float) -> str:
+    """Make a quantity of the slip angle. Hardly anyone measures it, so a fit that takes it as given says what twice the
+    angle would move."""
+    return scene.add_quantity(f"{name}_slip_angle", slip_angle, "rad", unsure=1.0)
 
 
 def check_friction(name: str, friction: float, slip_angle: float) -> None:

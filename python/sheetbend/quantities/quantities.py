@@ -36,6 +36,7 @@ class Quantity:
         scale: a natural size in `unit` where zero is a sensible value (angles, offsets), else None.
         limits: least and largest value that make sense, where that is not just positive.
         beyond: what to change where a fit stops at one of them, in words.
+        unsure: relative error that a positive one may have where a fit takes it as given.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Quantity:
     scale: float | None = None
     limits: tuple[float, float] | None = None
     beyond: str = "no value beyond makes sense: doubt the model"
+    unsure: float = 0.01
 
     def __post_init__(self) -> None:
         check_label("quantity", self.name)
@@ -107,6 +109,7 @@ class Builder(Protocol):
         limits: tuple[float, float] | None = None,
         shared: bool = False,
         beyond: str = Quantity.beyond,
+        unsure: float = Quantity.unsure,
     ) -> str: ...
 
     def add_terms(self, terms: Sequence[Term]) -> None: ...

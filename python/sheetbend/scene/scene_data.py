@@ -82,6 +82,7 @@ class SceneData:
         limits: tuple[float, float] | None = None,
         shared: bool = False,
         beyond: str = Quantity.beyond,
+        unsure: float = Quantity.unsure,
     ) -> str:
         """Declare a named quantity; `add_terms` says what it makes.
 
@@ -92,7 +93,7 @@ class SceneData:
             SceneError: the name is taken, or the value is not finite (or not positive where it must be).
         """
         self._building()
-        quantity = Quantity(name, value, unit, positive, scale, limits, beyond)
+        quantity = Quantity(name, value, unit, positive, scale, limits, beyond, unsure)
         before = self.quantities.setdefault(name, quantity)
         if before is quantity or (shared and before == quantity):
             return name

@@ -92,6 +92,7 @@ def _header(scene: Scene) -> dict[str, Any]:
                 "scale": None if q.scale is None else float(q.scale),
                 "limits": None if q.limits is None else [_finite_or_none(limit) for limit in q.limits],
                 "beyond": q.beyond,
+                "unsure": float(q.unsure),
             }
             for q in scene.quantities.values()
         ],

@@ -176,11 +176,12 @@ class SceneReader:
                     np.inf if high[""] is None else self._number(high, "", where + "limits"),
                 )
             beyond = self.part(about, "beyond", str, where) if "beyond" in about else Quantity.beyond
+            unsure = self._number(about, "unsure", where) if "unsure" in about else Quantity.unsure
             if name in found:
                 self.fail(where + "name", "is there twice", name, DAMAGED)
             try:
                 positive = self.part(about, "positive", bool, where)
-                found[name] = Quantity(name, value, unit, positive, scale, limits, beyond)
+                found[name] = Quantity(name, value, unit, positive, scale, limits, beyond, unsure)
             except SceneError as error:
                 self.fail(where + "value", error.problem, error.got, DAMAGED)
         return found
