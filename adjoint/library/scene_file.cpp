@@ -217,14 +217,16 @@ class SceneReader {
     m.parameter = file_.whole_numbers("parameter", 0, factors);
     const std::vector<int> function = file_.whole_numbers("function", 0, factors);
     m.weight = file_.numbers("weight", 0, factors);
-    const auto within = [&](const char* name, const std::vector<int>& values, std::size_t limit) {
+    const auto within = [&](const char* name, const std::vector<int>& values, long long least, std::size_t limit) {
       for (const int v : values)
-        if (v < 0 || static_cast<std::size_t>(v) >= limit)
-          file_.fail(name, "must lie in 0 to " + std::to_string(static_cast<long long>(limit) - 1));
+        if (v < least || v >= static_cast<long long>(limit))
+          file_.fail(name, "must lie in " + std::to_string(least) + " to " +
+                               std::to_string(static_cast<long long>(limit) - 1));
     };
-    within("target", m.target, layout.total());
-    within("parameter", m.parameter, quantities);
-    within("function", function, factor_count);
+    within("target", m.target, -entries, layout.total());
+    within("parameter", m.parameter, -m.intermediates(), quantities);
+    within("function", function, 0, factor_count);
+    if (!m.in_order()) file_.fail("target", "makes an intermediate value after it is used");
     for (const int f : function) m.function.push_back(static_cast<Factor1d>(f));
     return ParameterMap(std::move(m));
   }

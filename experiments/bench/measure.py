@@ -15,12 +15,13 @@ from sheetbend.cli.outcome import Code, Outcome, run
 from sheetbend.cli.screen import heading
 from sheetbend.errors import InputError
 from sheetbend_bench import WORKLOADS, measure, workload
+from sheetbend_bench.bodies import measure_bodies
 from sheetbend_bench.chain import measure_chain
 from sheetbend_bench.cloth import measure_cloth
 from sheetbend_bench.ladder import measure_ladder
 from sheetbend_bench.rod import measure_rod
 
-NAMES = (*WORKLOADS, "chain", "rod", "cloth", "ladder")
+NAMES = (*WORKLOADS, "chain", "bodies", "rod", "cloth", "ladder")
 
 
 def bench(
@@ -28,9 +29,9 @@ def bench(
         str,
         typer.Argument(
             metavar="WORKLOAD",
-            help="W1 a rope, W1s the same in small steps, W2 a cloth, W5 256 ropes, chain the direct solver, rod a "
-            "rope of 12 markers between grips, cloth sheets with strain and bending, ladder cloths of 441 to 1,000,000 "
-            "particles.",
+            help="W1 a rope, W1s the same in small steps, W2 a cloth, W5 256 ropes, chain the direct solver, bodies a "
+            "chain of hinged bodies beside it, rod a rope of 12 markers between grips, cloth sheets with strain and "
+            "bending, ladder cloths of 441 to 1,000,000 particles.",
             show_default=False,
         ),
     ],
@@ -56,6 +57,9 @@ def _bench(console: Console, name: str, threads: int, repeats: int, frames: int 
     if name == "chain":
         data = measure_chain(threads, repeats)
         _print_chain(console, data)
+    elif name == "bodies":
+        data = measure_bodies(threads, repeats)
+        _print_bodies(console, data)
     elif name == "rod":
         data = measure_rod(threads, repeats)
         _print_rod(console, data)
@@ -124,6 +128,19 @@ def _print_chain(console: Console, data: Mapping[str, Any]) -> None:
             f"  {b['ropes']} ropes of {b['segments']} segments, {name}: {b[f'{name}_ns']:.0f} in one batch, "
             f"{b[f'{name}_singly_ns']:.0f} one at a time, {b[f'{name}_speedup']:.1f} times the throughput",
             soft_wrap=True,
+        )
+
+
+def _print_bodies(console: Console, data: Mapping[str, Any]) -> None:
+    heading(console, "bodies", f"hinged bodies on the direct solver, beside ropes; {_conditions(data)}")
+    console.print(
+        "    bodies   segment      body  ratio  gradient/forward   (ns on the processor, per one and substep)"
+    )
+    for row in data["rows"]:
+        segment, body = row["segment_forward_cpu_ns"], row["forward_cpu_ns"]
+        console.print(
+            f"  {row['bodies']:8,}  {segment:8.0f}  {body:8.0f}  {body / segment:5.1f}"
+            f"  {row['gradient_cpu_ns'] / body:16.2f}"
         )
 
 

@@ -46,6 +46,7 @@ from .moved import keep_old_modules, renamed
 from .objects import laws
 from .objects.arm import add_arm, add_pendulum
 from .objects.arm_data import Arm
+from .objects.body_end import attach
 from .objects.cloth import Cloth, add_cloth, cloth
 from .objects.fabric import Fabric
 from .objects.grip import Grip
@@ -175,6 +176,7 @@ __all__ = [
     "add_unknown_force",
     "add_unknown_wind",
     "along_rope",
+    "attach",
     "ball",
     "baseline",
     "between",

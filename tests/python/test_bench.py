@@ -15,6 +15,7 @@ from measure import app
 from sheetbend.errors import SheetbendError
 from sheetbend_bench import WORKLOADS, measure, workload
 from sheetbend_bench import ladder as ladder_module
+from sheetbend_bench.bodies import measure_bodies
 from sheetbend_bench.chain import gradient_error, lengths, measure_chain
 from sheetbend_bench.cloth import measure_cloth
 from sheetbend_bench.ladder import measure_ladder, rung
@@ -259,6 +260,12 @@ class TestChainAndLadder:
         assert [(row["segments"], row["substeps"]) for row in found["rows"]] == [(20, 30), (50, 12), (300, 3)]
         assert found["particles"] == 301 and found["projections"] == 900
         assert found["batch"]["ropes"] == 64 and found["batch"]["gradient_speedup"] > 0
+
+    def test_bodies(self) -> None:
+        found = {**measure_bodies(repeats=1, work=120, bodies=(5, 20)), "exit_code": 0}
+        expect_figures(found)
+        assert [(row["bodies"], row["substeps"]) for row in found["rows"]] == [(5, 24), (20, 6)]
+        assert all(row["segment_forward_cpu_ns"] > 0 for row in found["rows"])
 
     @pytest.mark.slow
     def test_cloth(self) -> None:

@@ -233,3 +233,72 @@ def test_mistakes_in_servos_starts_and_forces_are_told(tmp_path: Path, old: str,
     assert old in MOVED
     with pytest.raises(sb.ConfigError, match=match):
         moved(tmp_path, MOVED.replace(old, new, 1))
+
+
+ON_A_BODY = """
+[experiment]
+name = "flag"
+
+[solver]
+h = 2e-3
+
+[[scene.body]]
+name = "pole"
+mass = 0.05
+box = [0.2, 0.01, 0.01]
+at = [0.1, 0.15, 0.0]
+
+[[scene.joint]]
+kind = "hinge"
+name = "hinge"
+lower = "pole"
+at = [0.1, 0.15, 0.1]
+axis = [1.0, 0.0, 0.0]
+
+[[scene.cloth]]
+name = "flag"
+density = 0.2
+warp = 50.0
+shear = 10.0
+bending = 1e-4
+
+[scene.cloth.mesh]
+kind = "grid"
+width = 0.2
+height = 0.15
+nx = 4
+ny = 3
+
+[[scene.cloth.grip]]
+set = "top"
+body = "pole"
+
+[[scene.particles]]
+name = "air"
+positions = [[0.1, 0.15, -0.9]]
+mass = 1e-9
+drag = 1e-3
+body = "pole"
+"""
+
+
+def test_a_cloth_and_particles_with_drag_are_attached_to_a_body(tmp_path: Path) -> None:
+    """On a fixed hinge, drag c at the distance r is a torque of c r^3 rate^2."""
+    (tmp_path / "flag.toml").write_text(ON_A_BODY)
+    scene = scene_alone(parse(tmp_path / "flag.toml"))[0]
+    cloth, pole = scene.cloths["flag"], scene.bodies["pole"]
+    assert list(pole.attached) == [*cloth.particles[cloth.mesh.sets["top"]], cloth.particles[-1] + 1]
+    assert scene.quantities["air_drag"].value == 1e-3 and {"flag_top_on_pole", "air_on_pole"} <= {
+        g.name for g in scene.groups
+    }
+
+    bare = ON_A_BODY[: ON_A_BODY.index("[[scene.cloth]]")] + ON_A_BODY[ON_A_BODY.index("[[scene.particles]]") :]
+    (tmp_path / "bare.toml").write_text(bare.replace("[solver]", "[scene]\ngravity = [0.0, 0.0, 0.0]\n\n[solver]"))
+    scene = scene_alone(parse(tmp_path / "bare.toml"))[0]
+    moment = 0.05 * (0.01**2 / 6 + 0.1**2)
+    motion = sb.simulate(scene, [0.0, 0.2], sb.Solver(h=1e-3), {"hinge_rate": 2.0})
+    rate = scene.bodies["pole"].angular_velocity(motion)[1, 0]
+    assert rate == pytest.approx(2.0 / (1.0 + 2.0 * 0.2 * 1e-3 / moment), rel=2e-3)
+    (tmp_path / "wrong.toml").write_text(ON_A_BODY.replace('body = "pole"', 'body = "none"'))
+    with pytest.raises(sb.ConfigError, match="no body of the scene"):
+        scene_alone(parse(tmp_path / "wrong.toml"))

@@ -110,18 +110,20 @@ class VertexSet(Section):
 
 
 class Grip(Section):
-    """Vertices of a cloth that are moved with markers or a tool. A list: [[scene.cloth.grip]]; every vertex moves as
-    the line through the markers does where it is nearest to it, or rigidly with the tool, from where it is placed."""
+    """Vertices of a cloth that are moved with markers or a tool, or fixed to a body. A list: [[scene.cloth.grip]];
+    every vertex moves as the line through the markers does where it is nearest to it, or rigidly with the tool or the
+    body, from where it is placed."""
 
     set: Name = key(..., "a set of vertices")
     markers: list[str | int] | None = key(None, "one marker, or several in order along the line", min_length=1)
     tool: Name | None = key(None, "the [[scene.tool]] that holds them, instead of markers")
+    body: Name | None = key(None, "the [[scene.body]] that they are fixed to, instead of markers")
     interpolation: Literal["cubic", "linear"] = key("cubic", "of the motion between frames; of a tool always cubic")
 
     @model_validator(mode="after")
     def _one_mover(self) -> Self:
-        if (self.markers is None) == (self.tool is None):
-            raise ValueError("must have one of markers and tool|give what moves the vertices")
+        if sum(mover is not None for mover in (self.markers, self.tool, self.body)) != 1:
+            raise ValueError("must have one of markers, tool and body|give what moves the vertices")
         return self
 
 

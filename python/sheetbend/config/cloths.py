@@ -16,11 +16,13 @@ from ..mesh import Places, TriangleMesh
 from ..mesh.places import nearest
 from ..mesh.subdivide import subdivided
 from ..mesh.through import through
+from ..objects.body_end import attach
 from ..objects.cloth import Cloth, add_cloth
 from ..objects.laws import COMPONENTS, Exponential, Law, Sinh, Spline
 from ..objects.tool import Tool
 from ..scene.scene import Scene
 from . import cloth_schema as schema
+from .bodies import named_body
 from .errors import located
 from .moment import Moment
 from .tools import tool_named
@@ -71,13 +73,17 @@ def build_cloth(
     base = None if section.on_tool is None else tools[section.on_tool]
     for i, (grip, vertices) in enumerate(zip(section.grip, gripped, strict=True)):
         where, held_there = f"{path}.grip[{i}]", cloth.particles[vertices]
-        if grip.tool is None:
+        if grip.body is not None:
+            body = named_body(f"{where}.body", grip.body, scene)
+            with located(where):
+                attach(body, held_there, name=f"{section.name}_{grip.set}_on_{grip.body}")
+        elif grip.tool is None:
             _drive(scene, where, grip, moment, held_there, shape[vertices])
-            continue
-        tool = tool_named(f"{where}.tool", grip.tool, tools)
-        points = tool.held((shape if base is None else mesh.vertices)[vertices])
-        with located(where):
-            tool.drive(scene, held_there, points)
+        else:
+            tool = tool_named(f"{where}.tool", grip.tool, tools)
+            points = tool.held((shape if base is None else mesh.vertices)[vertices])
+            with located(where):
+                tool.drive(scene, held_there, points)
     if base is not None and section.shape == "placed":
         base.frame.place(scene, cloth.particles)
     return cloth

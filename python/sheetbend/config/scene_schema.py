@@ -22,6 +22,10 @@ class Particles(Section):
     velocity: list[Vector] | None = key(None, "initial velocities; at rest when left out", "m/s")
     mass: Finite | list[Finite] = key(0.0, "one for all or one each; 0 where [[scene.point_mass]] gives it", "kg")
     pinned: bool = key(False, "hold them where they start")
+    body: Name | None = key(None, "the [[scene.body]] that they are fixed to where they start")
+    drag: Finite | None = key(
+        None, "quadratic air drag of each, force over speed squared: <name>_drag", "N s^2/m^2", ge=0
+    )
 
 
 class Pendulum(Section):

@@ -13,10 +13,12 @@ from ..errors import ConfigError
 from ..mesh import TriangleMesh
 from ..objects.arm import add_arm, add_pendulum
 from ..objects.arm_data import Arm
+from ..objects.body_end import attach
+from ..objects.pivot import add_air_drag
 from ..objects.tool import Tool
 from ..scene.scene import Scene
 from . import scene_schema as schema
-from .bodies import add_bodies
+from .bodies import add_bodies, named_body
 from .cloth_markers import seats
 from .cloths import build_cloth, placed_mesh
 from .contacts import add_contacts
@@ -149,6 +151,12 @@ def _add_particles(scene: Scene, particles: Particles, section: schema.SceneSect
             added = scene.add_particles(some.positions, some.mass, some.velocity)
             if some.pinned:
                 scene.pin(added)
+            if some.drag is not None:
+                add_air_drag(scene, added, f"{some.name}_drag", some.drag, "N s^2/m^2")
+        if some.body is not None:
+            body = named_body(f"{path}.body", some.body, scene)
+            with located(path):
+                attach(body, added, name=f"{some.name}_on_{some.body}")
         particles.add(some.name, added.tolist())
 
 

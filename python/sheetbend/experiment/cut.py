@@ -17,7 +17,7 @@ from .shooting import Shooting
 
 LEAST_FRAMES, LEAST_STEPS = 6, 40  # of a window
 STARTED = 8  # substeps: by then the second-order scheme has forgotten how it was started
-START = ("position", "velocity")  # what quantities of a start set
+START = ("position", "velocity", "intermediate")  # what quantities of a start set
 
 
 def shot(e: Experiment) -> Shooting | None:

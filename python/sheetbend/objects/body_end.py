@@ -1,11 +1,13 @@
-"""Ends of ropes and rods that are fixed to a rigid body: a cable in its plug, a flag's cord on its pole."""
+"""What is fixed to a rigid body: a cable in its plug, a flag on its pole, a face of a solid on a plate."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ..errors import SceneError
 from ..quantities.expression import expressions
-from ..scene.body import BodyPoint
+from ..scene.body import Body, BodyPoint
 from ..scene.scene import Array, Scene
 from .grip import any_across
 from .joint_making import constrain, ground
@@ -14,6 +16,43 @@ STUB = 1.0
 """Length of the link on a body that carries a cable's direction, over that of the cable's links. Only its direction
 matters. But it ends in a light particle that rigid rows hold, and a short one makes the bent joint beside it stiff:
 with 0.01, and 40 links of 12.5 mm, double precision lost these rows."""
+
+
+def attach(body: Body, particles: ArrayLike, *, name: str | None = None) -> str:
+    """Fix particles to a body where they are, such as the edge of a cloth to a pole.
+
+    They start on the body for all values of the quantities of its start, and have their own mass.
+
+    Args:
+        body: what `Scene.add_body` returned.
+        particles: their numbers, such as `cloth.particles[cloth.mesh.sets["left"]]`.
+        name: of the group of constraints, by which a motion has their forces; `<body>_attached` by default.
+
+    Returns:
+        The name of the group.
+
+    Raises:
+        SceneError: no body, no such particles, some twice, pinned or driven ones, or ones that are attached already.
+    """
+    if not isinstance(body, Body):
+        raise SceneError("attach.body", "is no body", body, "give what Scene.add_body returned")
+    scene: Scene = body.scene  # type: ignore[assignment]  # the one that bodies are made in
+    where, own = f"{body.name}.attach", np.ravel(particles).tolist()
+    scene.node_array(where, own)
+    taken = {p for b in scene.bodies.values() for p in (*b.particles.tolist(), *b.attached)}
+    bad = sorted({p for p in own if own.count(p) > 1 or p in taken or p in scene.held})
+    if bad:
+        fix = "give free particles, each once, that are part of no body and attached to none"
+        raise SceneError(where, "cannot fix these particles", bad, fix)
+    body.carrying()  # now, for its terms
+    origin, frame = body.pose(scene.nodes)
+    places = (scene.nodes[own] - origin) @ frame
+    body.attached |= dict(zip(own, places, strict=True))
+    p, *axes = body.particles.tolist()
+    weights = np.stack([body.coordinates(expressions(x)) for x in places])
+    group = f"{body.name}_attached" if name is None else name
+    constrain(scene, "coincide_particle", group, [[p, one, *axes] for one in own], weights)
+    return group
 
 
 def hold_place(scene: Scene, point: BodyPoint, particle: int, name: str, reach: float = 0.0) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_label, finite, is_number
 from ..errors import SceneError
-from ..quantities.expression import Array, Expression, cross, expressions, numbers, terms_of, vector
+from ..quantities.expression import Array, Expression, cross, expressions, names_in, numbers, terms_of, vector
 from ..quantities.quantities import ZERO_OR_MORE, Term
 from ..scene.body import AXES, GROUND, PLACE, Body, FrameState, HasMotion
 from ..scene.given import check_scene
@@ -116,7 +116,7 @@ class Making:
         """
         if self.lower.role != "free" or self.lower.start.carrier is not None or self._is_above():
             return
-        u, low = self.upper.start, self.lower.start
+        u, low = self.upper.carrying(), self.lower.start
         n = u.frame @ self.axes[0][0]
         frame, spin = low.frame, low.spin
         if turn is not None or fixed:
@@ -245,7 +245,7 @@ def constrain(
     viscosity: ArrayLike | None = None,
 ) -> None:
     """Add a group whose parameters (count, n) are expressions of the scene's quantities."""
-    now = numbers(parameters, {q: about.value for q, about in scene.quantities.items()})
+    now = numbers(parameters, {name: scene.quantities[name].value for name in names_in(parameters)})
     given = {"compliance": compliance, "damping": damping, "viscosity": viscosity}
     scene.add_constraints(kind, stencil, name=name, rest=now, **given)
     index = first_value(scene, name) + np.arange(now.size).reshape(now.shape)

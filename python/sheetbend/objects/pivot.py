@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..arrays.checks import is_number
 from ..errors import SceneError
@@ -99,11 +100,21 @@ def check_friction(name: str, friction: float, slip_angle: float) -> None:
 
 def _air(scene: Scene, arm: Arm, drag: float) -> None:
     """Quadratic drag on the arm's end: on a fixed pivot its torque is `drag` times the square of the rate."""
+    per_length = (f"{arm.name}_length", "inverse")
+    add_air_drag(scene, arm.end, f"{arm.name}_drag", drag, "N m s^2/rad^2", (per_length, per_length, per_length))
+
+
+def add_air_drag(
+    scene: Scene, nodes: ArrayLike, quantity: str, drag: float, unit: str, factors: tuple[tuple[str, str], ...] = ()
+) -> None:
+    """Add quadratic drag on each of the nodes, a quantity in its own unit; factors of others make it N s^2/m^2.
+
+    Raises:
+        SceneError: a negative drag, or a name that is taken.
+    """
     if not (is_number(drag) and math.isfinite(drag) and drag >= 0.0):
-        raise SceneError(f"{arm.name}.drag", "must be zero or more", drag, "give a number in N m s^2/rad^2")
+        raise SceneError(quantity, "must be zero or more", drag, f"give a number in {unit}")
     scene.has_drag = True
     limits = None if drag > 0.0 else ZERO_OR_MORE
-    quantity = scene.add_quantity(f"{arm.name}_drag", drag, "N m s^2/rad^2", positive=drag > 0.0, limits=limits)
-    per_length = (f"{arm.name}_length", "inverse")
-    factors = ((quantity, "identity"), per_length, per_length, per_length)
-    scene.add_terms([Term("drag_quadratic", arm.end, 1.0, factors)])
+    scene.add_quantity(quantity, drag, unit, positive=drag > 0.0, limits=limits)
+    scene.add_terms([Term("drag_quadratic", np.ravel(nodes), 1.0, ((quantity, "identity"), *factors))])

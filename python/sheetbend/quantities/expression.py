@@ -130,6 +130,11 @@ def rotation(names: Sequence[str]) -> Array:
     return found
 
 
+def names_in(of: Array) -> set[str]:
+    """Names of the quantities in an array of expressions."""
+    return {name for e in of.ravel() for factors in e.parts for name, _ in factors}
+
+
 def numbers(of: Array, values: Mapping[str, float]) -> Array:
     """The numbers of an array of expressions at values of its quantities."""
     flat = [e.at(values) for e in of.ravel()]

@@ -63,7 +63,10 @@ class Quantity:
 @dataclass(frozen=True)
 class Term:
     """coefficient * prod f(quantity) * exp(sum weight * quantity), added to entry `index` of the input array `array`;
-    or to several entries, with index (k,), each distinct, and one coefficient (and weight) for all or (k,)."""
+    or to several entries, with index (k,), each distinct, and one coefficient (and weight) for all or (k,).
+
+    A factor may be an intermediate value (`intermediate`) instead of a quantity. Terms of the array "intermediate",
+    which come before, make it."""
 
     array: str
     index: int | np.ndarray
@@ -74,6 +77,11 @@ class Term:
     @property
     def quantities(self) -> tuple[str, ...]:
         """Names of the quantities in it."""
+        return tuple(name for name in self.made_of if intermediate_of(name) is None)
+
+    @property
+    def made_of(self) -> tuple[str, ...]:
+        """Names of the quantities and intermediate values in it, one for each factor."""
         return tuple(name for name, _ in (*self.factors, *self.exponents))
 
     def places(self, offset: int, size: int) -> np.ndarray:
@@ -81,6 +89,16 @@ class Term:
         from the end of their array."""
         own = np.ravel(self.index)
         return offset + np.where(own < 0, own + size, own)
+
+
+def intermediate(k: int) -> str:
+    """What an intermediate value is called as a factor."""
+    return f"intermediate[{k}]"
+
+
+def intermediate_of(name: str) -> int | None:
+    """Which intermediate value a factor is, or None if it is a quantity."""
+    return int(name[13:-1]) if name.startswith("intermediate[") else None
 
 
 class Builder(Protocol):

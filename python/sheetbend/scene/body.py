@@ -9,7 +9,7 @@ axes R in it, so that X = R' (x - c).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -20,8 +20,8 @@ from ..arrays import checks
 from ..arrays.checks import check_label, finite
 from ..arrays.rotations import quaternions_of
 from ..errors import SceneError
-from ..quantities.expression import cross, expressions, numbers, terms_of, vector
-from ..quantities.quantities import Builder, Quantity, Term
+from ..quantities.expression import cross, expressions, names_in, numbers, terms_of, vector
+from ..quantities.quantities import Builder, Quantity, Term, intermediate
 
 Array = np.ndarray
 Values = Mapping[str, float] | None
@@ -43,6 +43,8 @@ class HasMotion(Protocol):
 class InScene(Builder, Protocol):
     """A scene, as a body of it asks for numbers."""
 
+    intermediates: int
+
     @property
     def quantities(self) -> dict[str, Quantity]: ...
 
@@ -51,8 +53,6 @@ class InScene(Builder, Protocol):
 
     @property
     def node_count(self) -> int: ...
-
-    def base_arrays(self) -> dict[str, Array]: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +75,11 @@ class FrameState:
     own: tuple[str, ...] = ()
     carrier: str | None = None
 
+    @property
+    def numbers(self) -> Array:
+        """All of it (18,), expressions."""
+        return np.concatenate([self.origin, self.frame.ravel(), self.velocity, self.spin])
+
 
 @dataclass(eq=False)
 class Body:
@@ -88,6 +93,7 @@ class Body:
         start: the state of its frame that it starts with.
         role: "free", "pinned" or "driven".
         spin_node: the hidden, pinned node that holds the angular momentum of a body that keeps it, or None.
+        attached: particles that are fixed to it, with their places (3,) m in its frame, at which they start.
     """
 
     name: str
@@ -98,6 +104,18 @@ class Body:
     start: FrameState = field(repr=False)
     role: str = "free"
     spin_node: int | None = None
+    attached: dict[int, Array] = field(default_factory=dict, repr=False)
+    _first: int | None = field(default=None, repr=False)  # of 18 intermediate values, the start as others see it
+
+    def carrying(self) -> FrameState:
+        """The start as intermediate values, of which a body that hangs on this one makes its own. Written out, the
+        start of a body at the end of a chain of joints would double in length with each."""
+        if all(set(e.parts) <= {()} for e in self.start.numbers):  # numbers, as of the ground
+            return self.start
+        if self._first is None:
+            self._first, self.scene.intermediates = self.scene.intermediates, self.scene.intermediates + 18
+        x = vector([intermediate(self._first + k) for k in range(18)])
+        return FrameState(x[:3], x[3:12].reshape(3, 3), x[12:15], x[15:])
 
     def point(
         self, at: ArrayLike = (0.0, 0.0, 0.0), along: ArrayLike | None = None, name: str | None = None
@@ -153,21 +171,28 @@ class Body:
         """(n, 4) expressions: weights of the body's nodes in the sums that make points (n, 3) m of its frame."""
         return np.stack([np.append(expressions(1.0), self.coordinates(place)) for place in places])
 
-    def start_terms(self) -> list[Term]:
+    def start_terms(self, given: Array, rates_given: Array) -> list[Term]:
         """Terms that make the nodes' initial positions and velocities depend on the quantities of the start: the
-        expressions minus the numbers that are in the scene's arrays already."""
+        expressions minus the numbers (nodes, 3) that are in the scene's arrays already. Before them, those of
+        `carrying`."""
         if self.role == "driven":
             return []
-        s, index = self.start, 3 * self.particles[:, None] + np.arange(3)
-        arms = np.stack([s.frame @ self.center, *(s.frame @ self.axes).T])
-        places = arms.copy()
-        places[0] = s.origin + arms[0]
-        found = terms_of("position", index, places - self.scene.nodes[self.particles])
+        carried: list[Term] = []
+        if self._first is not None:
+            own = self._first + np.arange(18)
+            carried = [Term("intermediate", own, 0.0, ()), *terms_of("intermediate", own, self.start.numbers)]
+        s = self.start if self._first is None else self.carrying()
+        nodes = np.append(self.particles, np.array(list(self.attached), dtype=self.particles.dtype))
+        index, point = 3 * nodes[:, None] + np.arange(3), np.ones(len(nodes), dtype=bool)
+        point[1:4] = False  # the axes are directions
+        arms = np.stack([s.frame @ x for x in (self.center, *self.axes.T, *self.attached.values())])
+        places = np.where(point[:, None], s.origin + arms, arms)
+        found = carried + terms_of("position", index, places - given[nodes])
         if self.role == "pinned":
             return found
         rates = np.stack([cross(s.spin, arm) for arm in arms])
-        rates[0] = s.velocity + rates[0]
-        return found + terms_of("velocity", index, rates - self.scene.base_arrays()["velocity"][self.particles])
+        rates = np.where(point[:, None], s.velocity + rates, rates)
+        return found + terms_of("velocity", index, rates - rates_given[nodes])
 
     def coordinates(self, place: Array) -> Array:
         """(3,) expressions: a place (3,) m of the body's frame, from the center of mass along the principal axes."""
@@ -191,7 +216,7 @@ class Body:
             SceneError: positions without the hidden nodes, which hold the axes.
         """
         p, turned = self._nodes(motion)
-        at = self.values(values)
+        at = self.values(values, names_in(self.axes) | names_in(self.center))
         frame = turned @ numbers(self.axes, at).T
         return p - frame @ numbers(self.center, at), frame
 
@@ -241,11 +266,12 @@ class Body:
         moments = np.array([at[f"{self.name}_inertia_{k}"] for k in (1, 2, 3)])
         return np.append(at[f"{self.name}_mass"], 0.5 * moments.sum() - moments)
 
-    def values(self, changed: Values = None) -> dict[str, float]:
-        """The scene's quantities by name, some of them changed."""
+    def values(self, changed: Values = None, names: Collection[str] | None = None) -> dict[str, float]:
+        """The scene's quantities by name, or those of some names; some of them changed."""
         if not isinstance(changed, Mapping | None):
             raise SceneError("values", "must be a mapping", changed, "give numbers by the names of quantities")
-        return {name: q.value for name, q in self.scene.quantities.items()} | dict(changed or {})
+        known = self.scene.quantities
+        return {name: known[name].value for name in (known if names is None else names)} | dict(changed or {})
 
     def _nodes(self, motion: HasMotion | ArrayLike, part: str = "nodes") -> tuple[Array, Array]:
         """The part of a motion's arrays (..., nodes, 3) that belongs to the center of mass, (..., 3), and to the axes,

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from .. import _core
 from ..errors import SceneError, choices, refusal
-from ..quantities.quantities import FUNCTIONS, Term
+from ..quantities.quantities import FUNCTIONS, Term, intermediate_of
 from . import pieces
 from .collider_speeds import Fastest, fastest
 from .domain import Domain
@@ -153,10 +153,11 @@ class CompiledScene:
     def _entries_of(self, every: Sequence[Term], names: Sequence[str], extra: int = 0) -> dict[str, np.ndarray]:
         """The arrays of some terms, without the base."""
         order = {name: i for i, name in enumerate(names)}
+        order |= {name: -1 - k for t in every for name in t.made_of if (k := intermediate_of(name)) is not None}
         arrays = self.layout | {"extra": (self.core.inputs, extra)}
         entries = np.array([np.size(t.index) for t in every], dtype=int)
-        lengths = np.array([len(t.quantities) for t in every], dtype=int)
-        parameter = np.array([order[name] for t in every for name in t.quantities], dtype=int)
+        lengths = np.array([len(t.made_of) for t in every], dtype=int)
+        parameter = np.array([order[name] for t in every for name in t.made_of], dtype=int)
         functions = [(*(f for _, f in t.factors), *("exp" for _ in t.exponents)) for t in every]
         function = np.array([FUNCTIONS[f] for own in functions for f in own], dtype=int)
         # Every entry of a term has all of its factors: where they stand in the two lists above.
@@ -168,10 +169,11 @@ class CompiledScene:
         weight = np.ones(len(place))  # of a quantity in an exponential
         for t, k, start in zip(every, entries, first_factor[np.cumsum(entries) - entries], strict=True):
             for e, (_, own) in enumerate(t.exponents, start=len(t.factors)):
-                width = len(t.quantities)
+                width = len(t.made_of)
                 weight[start + e : start + k * width : width] = own
+        targets = [-1 - t.places(0, 0) if t.array == "intermediate" else t.places(*arrays[t.array]) for t in every]
         return {
-            "target": _joined([t.places(*arrays[t.array]) for t in every]),
+            "target": _joined(targets),
             "coefficient": _joined(coefficients).astype(float),
             "first_factor": first_factor,
             "parameter": parameter[place],

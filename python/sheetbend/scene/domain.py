@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import SceneError
 from ..quantities.kinds import KINDS
+from ..quantities.quantities import intermediate_of
 from .scene_data import SceneData
 
 Array = np.ndarray
@@ -157,9 +158,13 @@ class Domain:
     def _makers(self, column: int, theta: Array | None) -> dict[str, float]:
         """The quantities that an input is made from: those that are zero, else those of either sign, else all."""
         names: dict[str, None] = {}
-        for t in self._scene.every_term:
-            if (t.places(*self._layout[t.array]) == column).any():
+        through: set[int | None] = set()  # intermediate values that it is made from
+        for t in reversed(self._scene.every_term):
+            between = t.array == "intermediate"
+            own = t.places(0, 0) if between else t.places(*self._layout[t.array])
+            if (through if between else {column}) & set(own.tolist()):
                 names |= dict.fromkeys(t.quantities)
+                through |= {intermediate_of(name) for name in t.made_of}
         quantities = self._scene.quantities
         values = {n: quantities[n].value for n in names}
         if theta is not None:

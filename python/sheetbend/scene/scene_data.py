@@ -66,6 +66,7 @@ class SceneData:
         self.solids: dict[str, Any] = {}
         self.bodies: dict[str, Body] = {}
         self.over_time: dict[str, Any] = {}  # unknown inputs
+        self.intermediates = 0  # how many intermediate values the terms make
         self.rotors: dict[str, list[int | None]] = {}  # five nodes by joint, of which the second turns
         self._particles, self._hidden = Rows(), Rows()
         self._frozen = False
@@ -123,11 +124,19 @@ class SceneData:
 
     @property
     def every_term(self) -> list[Term]:
-        """Those that were added, of the boundary, and of the start of bodies."""
-        starts = (t for body in self.bodies.values() for t in body.start_terms())
+        """Those that were added, of the boundary, and of the start of bodies, those first on which others hang."""
+        x, v = self.nodes, self._of_nodes("velocities")
+        starts = (t for body in sorted(self.bodies.values(), key=self._depth) for t in body.start_terms(x, v))
         contacts = self.contacts
         between = piece_terms(contacts.pieces, contacts.pair_friction, len(contacts.contacts), contacts.weights)
         return [*self.terms, *self.boundary.terms(), *self.forces.terms(), *starts, *between]
+
+    def _depth(self, body: Body) -> int:
+        """How many joints a body hangs on."""
+        joints, carrier = 0, body.start.carrier
+        while carrier is not None:
+            joints, carrier = joints + 1, self.bodies[carrier].start.carrier
+        return joints
 
     @property
     def sheets(self) -> list[Any]:

@@ -12,10 +12,11 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from .. import _core
 from ..errors import SceneError
 from ..files.memory import free_memory, in_words
 from ..quantities.kinds import KINDS
-from ..quantities.quantities import FUNCTIONS, Quantity, Term
+from ..quantities.quantities import FUNCTIONS, Quantity, Term, intermediate
 from .boundary import Following
 from .compiled import CompiledScene
 from .contact_file import read_contacts
@@ -148,11 +149,14 @@ class SceneReader:
             self._inputs(scene)
             scene.terms = self._terms(scene)
             compiled = CompiledScene(scene)  # checks all indices, which nothing may use before
+            _core.ParameterMap(compiled.map())  # checks the order of intermediate values
             scene.freeze()
         except SceneError as error:
             if error.field.startswith(str(self.path)):
                 raise
             self.fail(error.field, error.problem, error.got, error.fix)
+        except ValueError as error:
+            self.fail("target", str(error), None, DAMAGED)
         scene.__dict__["compiled"] = compiled
         if file_layout(scene) != self.header.get("layout"):
             self.fail("layout", "is not the one of this scene", self.header.get("layout"), DAMAGED)
@@ -298,16 +302,17 @@ class SceneReader:
         parameter = self.array("parameter", "i4", (factors,))
         function = self.array("function", "i4", (factors,))
         weight = self.array("weight", "f8", (factors,))
-        for name, values, limit in (
-            ("target", target, inputs),
-            ("parameter", parameter, len(scene.quantities)),
-            ("function", function, len(FUNCTIONS)),
+        made = max(0, -int(target.min())) if target.size else 0
+        for name, values, least, limit in (
+            ("target", target, -len(target), inputs),
+            ("parameter", parameter, -made, len(scene.quantities)),
+            ("function", function, 0, len(FUNCTIONS)),
         ):
-            if values.size and not (values.min() >= 0 and values.max() < limit):
-                self.fail(name, f"must lie in 0 to {limit - 1}", [int(values.min()), int(values.max())], DAMAGED)
+            if values.size and not (values.min() >= least and values.max() < limit):
+                self.fail(name, f"must lie in {least} to {limit - 1}", [int(values.min()), int(values.max())], DAMAGED)
         if first[0] != 0 or (np.diff(first) < 0).any():
             self.fail("first_factor", "must start at 0 and not decrease", first[:5].tolist(), DAMAGED)
-        names, functions = tuple(scene.quantities), tuple(FUNCTIONS)
+        names, functions = [*scene.quantities, *(intermediate(k) for k in range(made)[::-1])], tuple(FUNCTIONS)
         array_of = np.searchsorted([offset for _, offset in offsets], target, side="right") - 1
         terms: list[Term] = []
         begin, known = 0, None
@@ -318,12 +323,15 @@ class SceneReader:
                 key = (array_of[e], parameter[own].tobytes(), function[own].tobytes())
             if key != known and e > begin:
                 array, offset = offsets[array_of[begin]]
+                index = target[begin:e] - offset
+                if array_of[begin] < 0:
+                    array, index = "intermediate", -1 - target[begin:e]
                 own = slice(first[begin], first[begin + 1])
                 made_of = [(names[q], functions[f]) for q, f in zip(parameter[own], function[own], strict=True)]
                 weights = weight[first[begin] : first[e]].reshape(e - begin, -1)
                 pairs = tuple(pair for pair in made_of if pair[1] != "exp")
                 powers = tuple((q, weights[:, k]) for k, (q, f) in enumerate(made_of) if f == "exp")
-                terms.append(Term(array, target[begin:e] - offset, coefficient[begin:e], pairs, powers))
+                terms.append(Term(array, index, coefficient[begin:e], pairs, powers))
                 begin = e
             known = key
         return terms

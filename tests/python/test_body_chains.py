@@ -1,0 +1,117 @@
+"""Chains of hinged bodies: each start is made of the one above it, in files too; and what is attached to a body."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from scipy.spatial.transform import Rotation
+from test_scene_file import altered
+
+SIDE = 0.1  # m, of a body along the chain
+
+
+def chain(count: int, backwards: bool = False) -> tuple[sb.Scene, list[sb.Body], np.ndarray]:
+    """Bodies along x from the origin, hinged about axes of all directions; perhaps joined the last one first."""
+    scene, rng = sb.Scene("chain"), np.random.default_rng(2)
+    axes = rng.standard_normal((count, 3))
+    of = sb.Inertia.box(0.2, (SIDE, 0.04, 0.03))
+    bodies = [scene.add_body(f"b{k}", of=of, at=(SIDE * (k + 0.5), 0.0, 0.0)) for k in range(count)]
+    for k in range(count)[:: -1 if backwards else 1]:
+        upper = None if k == 0 else bodies[k - 1]
+        sb.hinge(upper, bodies[k], at=(SIDE * k, 0.0, 0.0), axis=axes[k], name=f"h{k}", rate=0.1 * k)
+    return scene, bodies, axes / np.linalg.norm(axes, axis=1)[:, None]
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_a_chain_starts_where_its_angles_say(backwards: bool) -> None:
+    """Places, attitudes and velocities of six bodies by a product of rotations; their gradient by a complex step."""
+    scene, bodies, axes = chain(6, backwards)
+    angles, rates = np.linspace(0.5, -0.7, 6), np.linspace(-2.0, 1.0, 6)
+    values = {f"h{k}_angle": a for k, a in enumerate(angles)} | {f"h{k}_rate": w for k, w in enumerate(rates)}
+    start = sb.simulate(scene, [0.0], sb.Solver(h=1e-3), values)
+    hinge, turned, v, spin = np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3)
+    for k, body in enumerate(bodies):
+        spin = spin + turned @ axes[k] * rates[k]
+        turned = turned @ Rotation.from_rotvec(axes[k] * angles[k]).as_matrix()
+        origin, frame = body.pose(start)
+        half = turned @ [0.5 * SIDE, 0.0, 0.0]
+        assert origin[0] == pytest.approx(hinge + half, abs=1e-14)
+        assert frame[0] == pytest.approx(turned, abs=1e-14)
+        assert body.angular_velocity(start)[0] == pytest.approx(spin, abs=1e-12)
+        assert start.node_velocities[0, body.particles[0]] == pytest.approx(v + np.cross(spin, half), abs=1e-13)
+        hinge, v = hinge + 2.0 * half, v + np.cross(spin, 2.0 * half)
+    report = sb.check_gradients(scene, [0.005, 0.01], sb.Solver(h=5e-3), samples=1, values=values)
+    assert report.passed, str(report)
+
+
+def test_the_terms_of_a_long_chain_grow_with_its_length() -> None:
+    sizes = [len(chain(n)[0].every_term) for n in (20, 40, 60)]
+    assert sizes[2] - sizes[1] == pytest.approx(sizes[1] - sizes[0], rel=0.05)
+    assert sizes[2] < 60 * 800
+
+
+def test_a_chain_is_kept_in_a_file(tmp_path: Path) -> None:
+    scene, _, _ = chain(4)
+    sb.save_scene(scene, tmp_path / "a.scene")
+    loaded = sb.load_scene(tmp_path / "a.scene")
+    values, times, solver = {"h0_angle": 0.3, "h2_rate": 1.0}, [0.0, 0.01], sb.Solver(h=5e-3)
+    one, two = (sb.rollout(s, times, solver, values) for s in (scene, loaded))
+    assert np.array_equal(one.nodes, two.nodes)
+    bar = np.ones_like(one.positions)
+    assert one.gradient(bar).quantities == two.gradient(bar).quantities
+    assert one.gradient(bar).quantities["h0_angle"] != 0.0
+    sb.save_scene(loaded, tmp_path / "b.scene")
+    whole = (tmp_path / "a.scene").read_bytes()
+    assert (tmp_path / "b.scene").read_bytes() == whole
+    late = np.array(scene.compiled.map()["target"])
+    late[np.flatnonzero(late < 0)[-1]] = -1  # a part of the first intermediate value, when others are made of it
+    (tmp_path / "c.scene").write_bytes(altered(whole, "target", late))
+    with pytest.raises(sb.SceneError, match="after it is used"):
+        sb.load_scene(tmp_path / "c.scene")
+
+
+def flag(angle: float = 0.0) -> tuple[sb.Scene, sb.Body, sb.Cloth]:
+    """A cloth that hangs from a pole, which swings on a hinge above it."""
+    scene = sb.Scene("flag")
+    pole = scene.add_body("pole", of=sb.Inertia.box(0.05, (0.22, 0.01, 0.01)), at=(0.1, 0.15, 0.0))
+    sb.hinge(None, pole, at=(0.1, 0.15, 0.1), axis=(1.0, 0.3, 0.0), name="hinge", viscosity=1e-4)
+    cloth = sb.add_cloth(
+        scene, sb.mesh.grid(0.2, 0.15, 4, 3), "sheet", density=0.2, warp=50.0, shear=20.0, bending=1e-4
+    )
+    sb.attach(pole, cloth.particles[cloth.mesh.sets["top"]])
+    return scene, pole, cloth
+
+
+@pytest.mark.filterwarnings("ignore:cloth")
+@pytest.mark.parametrize("method", ["newton", "direct", "implicit"])
+def test_the_edge_of_a_cloth_stays_on_its_pole(method: str) -> None:
+    """It starts there for any angle and rate of the pole's hinge; the gradient is exact."""
+    scene, pole, cloth = flag()
+    edge, solver = cloth.particles[cloth.mesh.sets["top"]], sb.Solver(h=2e-3, method=method, iterations=4)
+    values = {"hinge_angle": 0.4, "hinge_rate": 2.0}
+    motion = sb.simulate(scene, [0.0, 0.02], solver, values)
+    origin, frame = pole.pose(scene.nodes)
+    kept = (scene.positions[edge] - origin) @ frame
+    for moved, origin, frame in zip(motion.positions, *pole.pose(motion), strict=True):
+        assert moved[edge] == pytest.approx(origin + kept @ frame.T, abs=1e-9)
+    spin, arm = pole.angular_velocity(motion)[0], motion.positions[0, edge] - [0.1, 0.15, 0.1]
+    assert motion.velocities[0, edge] == pytest.approx(np.cross(spin, arm), abs=1e-12)
+    report = sb.check_gradients(scene, [0.004, 0.008], solver, samples=1, values=values)
+    assert report.passed, str(report)
+
+
+@pytest.mark.filterwarnings("ignore:cloth")
+def test_what_cannot_be_attached_is_refused() -> None:
+    scene, pole, cloth = flag()
+    top = cloth.particles[cloth.mesh.sets["top"]]
+    scene.pin([cloth.particles[0]])
+    for particles in ([int(top[0])], [int(cloth.particles[0])], [int(pole.particles[0])], [1, 1]):
+        with pytest.raises(sb.SceneError, match="cannot fix these particles"):
+            sb.attach(pole, particles)
+    with pytest.raises(sb.SceneError, match="particle indices"):
+        sb.attach(pole, [])
+    with pytest.raises(sb.SceneError, match="is no body"):
+        sb.attach(scene, [1])  # type: ignore[arg-type]
