@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sheetbend as sb
+import sheetbend.torch as st
+import torch
 from scipy.spatial.transform import Rotation
 from test_scene_file import altered
 
@@ -71,6 +73,21 @@ def test_a_chain_is_kept_in_a_file(tmp_path: Path) -> None:
     (tmp_path / "c.scene").write_bytes(altered(whole, "target", late))
     with pytest.raises(sb.SceneError, match="after it is used"):
         sb.load_scene(tmp_path / "c.scene")
+
+
+def test_torch_starts_a_chain_where_the_core_does() -> None:
+    """With the derivatives with respect to the angles and rates of all hinges."""
+    scene, _, _ = chain(5)
+    solver, times = sb.Solver(h=5e-3), [0.0, 0.01]
+    values = {f"h{k}_angle": 0.2 * k - 0.3 for k in range(5)} | {f"h{k}_rate": 1.0 - k for k in range(5)}
+    given = {name: torch.tensor(value, dtype=torch.float64, requires_grad=True) for name, value in values.items()}
+    found, wanted = st.simulate(scene, times, solver, values=given), sb.rollout(scene, times, solver, values)
+    assert np.allclose(found.detach().numpy(), wanted.positions, rtol=0.0, atol=1e-13)
+    bar = np.random.default_rng(0).standard_normal(found.shape)
+    (found * torch.tensor(bar)).sum().backward()
+    gradient = wanted.gradient(bar).quantities
+    for name, tensor in given.items():
+        assert tensor.grad is not None and float(tensor.grad) == pytest.approx(gradient[name], rel=1e-9, abs=1e-12)
 
 
 def flag(angle: float = 0.0) -> tuple[sb.Scene, sb.Body, sb.Cloth]:

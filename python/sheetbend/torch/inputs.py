@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -32,40 +33,90 @@ class ParameterMap:
     """inputs[target] = base[target] + sum of coefficient * (prod f(theta) * exp(sum weight * theta)), in the order of
     adjoint/observe/parameter_map.h.
 
-    Plain torch operations, so every transform differentiates and batches it by itself.
+    Plain torch operations, so every transform differentiates and batches it by itself. Intermediate values stand before
+    theta. Each step computes those that are made of earlier ones, and the last step computes the inputs.
     """
 
     def __init__(self, scene: Scene) -> None:
         arrays = scene.compiled.map()
         self._base = torch.tensor(arrays["base"], dtype=torch.float64)
-        self._target = torch.tensor(arrays["target"], dtype=torch.long)
-        self._coefficient = torch.tensor(arrays["coefficient"], dtype=torch.float64)
-        # Each quantity under each function is computed once; terms pick factors and exponents from these.
-        each = np.stack([arrays["function"], arrays["parameter"], arrays["weight"]], 1).astype(float).reshape(-1, 3)
-        distinct, place = np.unique(each, axis=0, return_inverse=True)
-        own = {name: distinct[distinct[:, 0] == number] for name, number in FUNCTIONS.items()}
-        self._groups = [
-            (name, torch.tensor(rows[:, 1], dtype=torch.long), torch.tensor(rows[:, 2])) for name, rows in own.items()
-        ]
-        count = np.diff(arrays["first_factor"])
-        term, grows = np.repeat(np.arange(len(count)), count), each[:, 0] == FUNCTIONS["exp"]
-        one, zero = len(distinct), len(distinct) + 1
-        self._factors = _rows(term[~grows], place.ravel()[~grows], len(count), one)
-        self._exponents = _rows(term[grows], place.ravel()[grows], len(count), zero)
+        depth, made = _depths(arrays), max(0, -int(arrays["target"].min(initial=0)))
+        self._intermediates, last = made, int(depth.max(initial=0))
+        self._steps = [_Step.of(arrays, depth == k, made) for k in range(last)]
+        self._last = _Step.of(arrays, depth == last, made)
 
     def __call__(self, theta: Tensor) -> Tensor:
         """(..., quantities) to (..., total)."""
         batch = theta.shape[:-1]
-        arguments = [(name, weight * theta.index_select(-1, which)) for name, which, weight in self._groups]
+        known = torch.cat([theta.new_zeros(*batch, self._intermediates), theta], -1)
+        for step in self._steps:
+            known = step.added_to(known, known)
+        return self._last.added_to(self._base.expand(*batch, -1), known)
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """Terms that are made of known values, and where they go.
+
+    Attributes:
+        target, coefficient: (terms,).
+        functions: (name, values, weights) of all functions of weighted values; each is computed once.
+        factors, exponents: (terms, most) places among them, in the order of each term.
+    """
+
+    target: Tensor
+    coefficient: Tensor
+    functions: list[tuple[str, Tensor, Tensor]]
+    factors: Tensor
+    exponents: Tensor
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, np.ndarray], chosen: np.ndarray, intermediates: int) -> _Step:
+        """Some of the terms of a map, all of which go to inputs or all to intermediate values."""
+        count = np.diff(arrays["first_factor"])
+        own = np.repeat(chosen, count)
+        parameter, function = arrays["parameter"][own], arrays["function"][own]
+        place = np.where(parameter < 0, -1 - parameter, intermediates + parameter)
+        each = np.stack([function, place, arrays["weight"][own]], 1).astype(float).reshape(-1, 3)
+        distinct, which = np.unique(each, axis=0, return_inverse=True)
+        groups = {name: distinct[distinct[:, 0] == number] for name, number in FUNCTIONS.items()}
+        count, which = count[chosen], which.ravel()
+        term, grows = np.repeat(np.arange(len(count)), count), each[:, 0] == FUNCTIONS["exp"]
+        one, zero = len(distinct), len(distinct) + 1
+        target = arrays["target"][chosen]
+        return cls(
+            torch.tensor(np.where(target < 0, -1 - target, target), dtype=torch.long),
+            torch.tensor(arrays["coefficient"][chosen], dtype=torch.float64),
+            [(n, torch.tensor(rows[:, 1], dtype=torch.long), torch.tensor(rows[:, 2])) for n, rows in groups.items()],
+            _rows(term[~grows], which[~grows], len(count), one),
+            _rows(term[grows], which[grows], len(count), zero),
+        )
+
+    def added_to(self, sums: Tensor, known: Tensor) -> Tensor:
+        """The sums with the terms of known values (..., intermediate values and quantities) added."""
+        arguments = [(name, weight * known.index_select(-1, which)) for name, which, weight in self.functions]
         functions = [x if name == "exp" else _TORCH[name](x) for name, x in arguments]
-        values = torch.cat([*functions, theta.new_ones(*batch, 1), theta.new_zeros(*batch, 1)], -1)
-        product, exponent = theta.new_ones(()), theta.new_zeros(())
-        for column in self._factors.unbind(1):
+        batch = known.shape[:-1]
+        values = torch.cat([*functions, known.new_ones(*batch, 1), known.new_zeros(*batch, 1)], -1)
+        product, exponent = known.new_ones(()), known.new_zeros(())
+        for column in self.factors.unbind(1):
             product = product * values.index_select(-1, column)
-        for column in self._exponents.unbind(1):
+        for column in self.exponents.unbind(1):
             exponent = exponent + values.index_select(-1, column)
-        product = self._coefficient * (product * torch.exp(exponent))
-        return self._base.expand(*batch, -1).index_add(-1, self._target, product.expand(*batch, -1))
+        product = self.coefficient * (product * torch.exp(exponent))
+        return sums.index_add(-1, self.target, product.expand(*batch, -1))
+
+
+def _depths(arrays: Mapping[str, np.ndarray]) -> np.ndarray:
+    """(terms,) how many intermediate values a term is made of one after another; those that go to inputs come last."""
+    first, parameter, target = arrays["first_factor"], arrays["parameter"], arrays["target"]
+    depth, of_value = np.zeros(len(target), dtype=int), dict[int, int]()
+    for t in np.flatnonzero(target < 0):
+        made_of = parameter[first[t] : first[t + 1]]
+        depth[t] = max((1 + of_value[k] for k in made_of.tolist() if k < 0), default=0)
+        of_value[int(target[t])] = max(depth[t], of_value.get(int(target[t]), 0))
+    depth[target >= 0] = 1 + max(of_value.values(), default=-1)
+    return depth
 
 
 def _rows(term: np.ndarray, place: np.ndarray, terms: int, none: int) -> Tensor:
