@@ -20,6 +20,7 @@ from ..pictures.along_plot import plot_along
 from ..pictures.estimate_plot import plot_estimates
 from ..pictures.force_plot import plot_forces
 from ..pictures.over_time_plot import plot_over_time
+from ..report.report_over_time import without_modes
 from .cloth_figures import cloth_figures, stiffness_figures
 
 if TYPE_CHECKING:
@@ -65,7 +66,8 @@ def write_figures(found: Fit, config: Config, form: str, folder: Path) -> list[s
     figures |= {one.name: plot_along(one) for one in found.result.fields if one.place == "joint"}
     figures |= {f"{one.recording}_{one.name}": plot_over_time(one) for one in found.result.over_time}
     published = _published(found, config)
-    figures["estimates"] = plot_estimates(found.result.estimates, published=published, title=config.experiment.name)
+    told = without_modes(found.result).estimates
+    figures["estimates"] = plot_estimates(told, published=published, title=config.experiment.name)
     for name, figure in figures.items():
         plotting.save(figure, folder / f"{name}.{form}")
     return [f"{name}.{form}" for name in figures]

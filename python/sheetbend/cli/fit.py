@@ -16,7 +16,6 @@ from ..config.driven_motion import driven_files, save_driven, with_driven
 from ..config.values import with_values, write
 from ..doubts.implausible import implausible
 from ..errors import ConfigError
-from ..experiment.wanted import as_parameters
 from ..files.door import reading
 from ..files.whole import write_text
 from ..fitting.fit import Fit
@@ -165,7 +164,7 @@ def _fit(
 def _fit_study(console: Console, study: Study, source: Path, folder: Path, movie: Path | None, strict: bool) -> Outcome:
     config = study.config
     fitted = [e for e in study.experiments if e.predict is None]
-    problem = FitProblem(fitted, as_parameters(study.parameters, study.experiments))
+    problem = FitProblem(fitted, study.wanted)
     _check_starts(config, problem)
     listing(console, study.assumptions)
     listing(console, (f"warning: {words}" for words in implausible(problem)))

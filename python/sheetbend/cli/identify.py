@@ -140,9 +140,9 @@ def _identify(
 
 
 def _code(plan: Plan) -> Code:
-    if any(e.verdict == "rough" for e in plan.estimates):
+    if any(e.verdict == "rough" for e in plan.told):
         return Code.NOT_CONVERGED
-    unknown = [e.verdict == "not identifiable" for e in plan.estimates]
+    unknown = [e.verdict == "not identifiable" for e in plan.told]
     return Code.NOT_IDENTIFIABLE if all(unknown) else Code.DONE
 
 

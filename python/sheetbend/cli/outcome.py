@@ -19,6 +19,7 @@ from ..errors import InputError, SheetbendError
 from ..files.door import noting
 from ..optional import MissingExtraError
 from ..report.fit_result import FitResult
+from ..report.report_over_time import without_modes
 from .notices import noticed
 from .screen import Screen, silence
 from .stopping import Stopping
@@ -95,7 +96,7 @@ def code_of(results: Sequence[FitResult], strictly: bool) -> Code:
         return Code.INTERRUPTED
     if not all(result.converged and result.sound for result in results):
         return Code.NOT_CONVERGED
-    unknown = [[e.verdict == "not identifiable" for e in result.estimates] for result in results]
+    unknown = [[e.verdict == "not identifiable" for e in without_modes(result).estimates] for result in results]
     return Code.NOT_IDENTIFIABLE if any(any(u) if strictly else all(u) for u in unknown) else Code.DONE
 
 

@@ -13,6 +13,7 @@ from ..experiment.wanted import as_parameters
 from ..minimum.discretization import Refinement
 from ..minimum.smooth import Smooth, with_fields
 from ..motion.solver import Solver
+from ..quantities.parameters import Parameters
 from ..recording.windows import check_windows
 from ..scene.scene import Scene
 from . import schema
@@ -52,6 +53,12 @@ class Study:
     def assumptions(self) -> tuple[str, ...]:
         """What holds the ends of ropes, and what that assumes, in words."""
         return assumptions(self.config.scene)
+
+    @property
+    def wanted(self) -> Parameters:
+        """The parameters as `sb.fit` takes them, with the modes of fields and unknown inputs, not expanded."""
+        given = as_parameters(self.parameters, self.experiments)
+        return with_fields(given, self.experiments, smooth_fields(self.config))[0]
 
     @property
     def options(self) -> dict[str, Any]:

@@ -89,9 +89,9 @@ class Plan:
 
     def sections(self) -> list[Section]:
         """The report as data, empty sections left out."""
-        rows = [_row(e) for e in self._told]
+        rows = [_row(e) for e in self.told]
         headers = ("parameter", "planned", "+/-", "95 % interval", "unit", "verdict to expect")
-        notes = tuple((e.name, e.words) for e in self._told if e.verdict != "identified")
+        notes = tuple((e.name, e.words) for e in self.told if e.verdict != "identified")
         parts = [
             Section("Intervals to expect", headers, tuple(rows), notes),
             self._over_time(),
@@ -102,7 +102,7 @@ class Plan:
         return [part for part in parts if part.rows or part.notes]
 
     @property
-    def _told(self) -> list[Estimate]:
+    def told(self) -> list[Estimate]:
         """The estimates but for modes of inputs over time."""
         modes = {mode for one in self.inputs for mode in one.modes}
         return [e for e in self.estimates if e.name not in modes]
@@ -122,7 +122,7 @@ class Plan:
 
     def _compared(self) -> Section:
         """Half-widths of each variant over those of the plan."""
-        names = [e.name for e in self._told]
+        names = [e.name for e in self.told]
         rows = []
         for variant in self.variants:
             cells = [_gain(self[name], variant.half_widths[name], variant.verdicts[name]) for name in names]

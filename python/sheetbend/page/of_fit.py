@@ -16,6 +16,7 @@ from ..fitting.fit import Fit
 from ..quantities.wording import short
 from ..report.fit_result import FitResult
 from ..report.report import headline, sections
+from ..report.report_over_time import without_modes
 from ..report.tables import Section
 from ..result.estimate import UNSOUND
 from ..result.result import Start
@@ -81,6 +82,7 @@ def result_page(
     Raises:
         MissingExtraError: jinja2 is not installed.
     """
+    told_of = without_modes(result)
     told = [table(section) for section in (*sections(result), *more)]
     return render(
         "fit.html",
@@ -88,16 +90,16 @@ def result_page(
         about=about,
         headline=headline(result),
         message="" if result.converged else result.message,
-        tone=_tone(result),
-        counts=_counts(result),
+        tone=_tone(told_of),
+        counts=_counts(told_of),
         first=[part for part in told if part["title"] in _FIRST],
         rest=[part for part in told if part["title"] not in _FIRST],
-        starts=_starts(result),
-        profiles=profile_pictures(result),
+        starts=_starts(told_of),
+        profiles=profile_pictures(told_of),
         box=(WIDTH, HEIGHT),
         data={
             "motions": packed_motions(motions),
-            "correlations": _matrix(result),
+            "correlations": _matrix(told_of),
             "fit": compressed(json.dumps(result.to_dict(), indent=2, allow_nan=False)),
         },
         remarks=remarks,

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,20 +15,30 @@ from ..result.result import FitData
 from .report_fields import interval
 from .tables import Section
 
+Told = TypeVar("Told", bound=FitData)
 LISTED = 24  # knots at most; fit.json has all
 
 
-def without_modes(result: FitData) -> FitData:
+def without_modes(result: Told) -> Told:
     """The result without the numbers that make up inputs over time, which have tables of their own."""
     modes = {mode for found in result.over_time for mode in found.modes}
     if not modes:
         return result
+    drawn = result.bootstrap
+    if drawn is not None:
+        drawn = replace(drawn, intervals=tuple(one for one in drawn.intervals if one.name not in modes))
     return replace(
         result,
+        bootstrap=drawn,
+        starts=tuple(replace(s, values=_others(s.values, modes), first=_others(s.first, modes)) for s in result.starts),
         estimates=tuple(e for e in result.estimates if e.name not in modes),
         correlations=tuple(c for c in result.correlations if not {c.first, c.second} & modes),
         profiles=tuple(p for p in result.profiles if p.name not in modes),
     )
+
+
+def _others(values: Mapping[str, float], names: set[str]) -> dict[str, float]:
+    return {name: value for name, value in values.items() if name not in names}
 
 
 def inputs_over_time(result: FitData) -> list[Section]:
