@@ -28,7 +28,7 @@ SIZE, LENGTH = 0.3, 0.1  # of the prior that fields are drawn from
 NOISE = 1e-3
 SOLVER = sb.Solver(h=0.01, method="newton")
 ALL = (CELLS + 1) ** 2 - 1  # modes of the mesh
-AFTER_NEWTON = {"refine": False, "profiles": False, "beginnings": False, "windows": ()}
+AFTER_NEWTON = {"refine": False, "profiles": False}
 
 
 @dataclass(frozen=True)
