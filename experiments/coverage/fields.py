@@ -27,7 +27,7 @@ from sheetbend.minimum.counts import counted
 
 SIDE, CELLS, WARP, EI, JOINTS = 0.3, 14, 20.0, 1e-3, 20
 SIZE, LENGTH = 0.3, 0.1  # of the prior that fields are drawn from
-AFTER_NEWTON = {"refine": False, "profiles": False, "beginnings": False, "windows": ()}
+AFTER_NEWTON = {"refine": False, "profiles": False}
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,8 @@ Errors that change as slowly as a beginning is long go into its minimum without 
 the other stretches would move in it counts in the comparison, as far as the given sigma allows for their size
 (`stretches`).
 
-Nothing is done where the residuals are white and as large as the given sigma.
+Nothing is done where the residuals are white and as large as the given sigma, but for motions with many unknowns of
+their own: these explain nearly all of a motion in a wrong minimum, too.
 """
 
 from __future__ import annotations
@@ -47,6 +48,7 @@ from .driven_errors import driven_errors
 
 FRAMES = 12  # of every motion: fewer do not tell how residuals correlate
 LARGE = 4.0  # of the residuals' mean square, in sigma squared
+MANY = 40  # unknowns of one motion
 COLORED = 0.2  # autocorrelation of residuals that are not noise
 KNOWN = 1.0  # of the same: a beginning that leaves more of a parameter open tells nothing of it
 TOLERANCE = 1e-4  # of the cost: a beginning's minimum
@@ -120,7 +122,8 @@ def checked(
     """
     found = beginnings(problem, ends[0], growths)
     whole = Whole(problem, ends[0].u)
-    if not any(_differences(whole, b, LEVEL / len(found)) for b in found):
+    lower = _many(problem) and any(_leaves_more(b, LEVEL / len(found)) for b in found)
+    if not lower and not any(_differences(whole, b, LEVEL / len(found)) for b in found):
         return tuple(ends), found
     try:
         other = search.onward(problem, found[-1].u)
@@ -133,11 +136,11 @@ def checked(
 
 def beginnings(problem: FitProblem, end: Minimum, growths: Sequence[Growth]) -> tuple[Beginning, ...]:
     """Beginnings of increasing length, each fitted from the minimum of the one before, the first from the end of the
-    whole; none where the residuals there are noise, or where that end is none."""
+    whole; none where the residuals there are noise and the unknowns few, or where that end is none."""
     if not end.converged or problem.estimates_corrections:
         return ()
     ok, r, _ = problem.evaluate(end.u)
-    if not ok or not _systematic(problem, r):
+    if not ok or not (_systematic(problem, r) or _many(problem)):
         return ()
     at, u, found = _times(problem), end.u, []
     for length in chosen(problem, growths):
@@ -187,6 +190,20 @@ def _asked(whole: Whole, judged: Identifiability, found: Sequence[Beginning], re
             if abs(step) > least + shift[column]:
                 words[name] = _words(problem, u, column, b, step, reach)
     return drawn_along(judged, words)
+
+
+def _many(problem: FitProblem) -> bool:
+    """Whether a motion has so many unknowns that residuals as large as noise do not tell a right minimum."""
+    return any(len(problem.acting_on(e)) >= MANY for e in problem.experiments if not e.static)
+
+
+def _leaves_more(b: Beginning, level: float) -> bool:
+    """Whether the whole's values leave more of a beginning than what its own unknowns take of noise. The test of
+    differences misses it where a beginning leaves most unknowns open."""
+    count = len(b.u)
+    variance = 2.0 * b.cost / max(b.problem.core.data_rows - count, 1)
+    drop = 2.0 * (b.before - b.cost) / max(variance, 1e-300)
+    return bool(require("scipy.special", "fit").chdtrc(count, max(drop, 0.0)) < level)
 
 
 def _systematic(problem: FitProblem, r: Array) -> bool:

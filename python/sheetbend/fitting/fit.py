@@ -206,7 +206,7 @@ def fit(
             companions(e, fitted, wanted)
     experiments, found_at = joined(experiments, wanted, threads, progress)
     fitted = _fitted(experiments)
-    wanted, found_at, fields = settled(fitted, wanted, found_at, fields, threads, progress)
+    wanted, found_at, fields = settled(fitted, wanted, found_at, fields, threads, windows, progress)
     problem = FitProblem(fitted, wanted, threads=threads, expanded=found_at)
     problem.check_start()
     check_given(asked.given, problem)

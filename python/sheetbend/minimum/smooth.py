@@ -24,10 +24,12 @@ from ..objects.over_time import OverTime
 from ..objects.stiffness_field import StiffnessField
 from ..quantities.parameters import Parameter, Parameters
 from ..statistics.spectral import autocorrelation
+from .growth import growths
 from .optimizers import walked
 from .parts import expanded_to
 from .problem import FitProblem
 from .progress import Observer
+from .windows import chosen, through
 
 FIRST_SIZE, FIRST_LENGTH = 0.5, 0.25  # of the scale, which is 1 for ln E; of the extent
 SIZES, LENGTHS = (1e-3, 10.0), (0.1, 10.0)  # that are looked at; lengths of the shortest wave's and of the extent
@@ -185,21 +187,28 @@ def settled(
     expanded: Parameters | None,
     fields: Sequence[Field],
     threads: int,
+    windows: Sequence[float] | str = (),
     observe: Observer | None = None,
 ) -> tuple[Parameters, Parameters | None, tuple[Field, ...]]:
     """The parameters with the priors that are most likely, also expanded where the search begins, and the fields.
 
+    So many numbers explain a long motion nearly in a wrong minimum, too. So the first walk goes through windows.
+
     Args:
         expanded: where the search begins so far; None = at the initial values.
+        windows: s, or "auto", see `fit`.
     """
     if not fields:
         return wanted, expanded, ()
     here, found = expanded_to(wanted, experiments) if expanded is None else expanded, tuple(fields)
     u = here.initial()
-    for _ in range(ROUNDS):
+    for k in range(ROUNDS):
         for field in found:
             wanted, here = field.carried(wanted), field.carried(here)
         problem = FitProblem(experiments, wanted, threads=threads, expanded=here)
+        if k == 0:
+            lengths = chosen(problem, growths(problem, u)) if isinstance(windows, str) else [*map(float, windows)]
+            u = through(problem, lengths, u)
         u = walked(problem, u, observe)
         picture = Picture.at(problem, u, found)
         if picture is None:

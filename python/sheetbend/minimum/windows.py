@@ -100,6 +100,17 @@ def along(
         ahead.insert(0, between)
 
 
+def through(whole: FitProblem, lengths: Sequence[float], u: np.ndarray, tally: Tally | None = None) -> np.ndarray:
+    """(free,) where walks through windows end, for a walk on the whole motion to begin at."""
+    for length, walk in along(whole, [*lengths, math.inf], u, tally or Tally()):
+        if math.isinf(length):
+            return walk.u
+        while walk.iterations < STEPS and walk.step():
+            if walk.promised < TOLERANCE or walk.taken < TOLERANCE:
+                break
+    raise AssertionError("the whole motion comes last")
+
+
 def holds_frames(problem: FitProblem, length: float) -> bool:
     """Whether every motion has two fitted frames within `length` s."""
     pairs = zip(problem.experiments, problem.recordings, strict=True)
