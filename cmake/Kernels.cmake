@@ -96,6 +96,15 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT SHEETBEND_SANITIZE)
   endforeach()
 endif()
 
+# On x86-64-v3 gcc copies structs in pieces of 16 bytes, so a register that is loaded from such a copy waits for two stores. With pieces as wide as the
+# registers, constraints on duals take down to a quarter of the time (docs/decisions/what-a-build-compiles.md).
+include(CheckCXXCompilerFlag)
+check_cxx_compiler_flag(-mmove-max=256 SHEETBEND_HAS_MOVE_MAX)
+set(copies_v3)
+if(SHEETBEND_HAS_MOVE_MAX)
+  set(copies_v3 -mmove-max=256 -mstore-max=256)
+endif()
+
 set(kernel_objects)
 set(kernel_libraries)
 # An object library of one instruction set; `part` tells apart those that are compiled with other options.
@@ -107,7 +116,7 @@ function(sheetbend_add_kernels variant part)
   target_include_directories(${library} PRIVATE ${PROJECT_SOURCE_DIR})
   if(NOT variant STREQUAL "portable")
     set(name x86-64-${variant})
-    target_compile_options(${library} PRIVATE -march=${name})
+    target_compile_options(${library} PRIVATE -march=${name} ${copies_${variant}})
   endif()
   if(NOT SHEETBEND_SANITIZE)
     # They throw nothing and call nothing that throws, so nobody unwinds them: the tables for it are an eighth of the portable ones. Sanitizers

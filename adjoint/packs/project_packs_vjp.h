@@ -41,7 +41,7 @@ inline __attribute__((always_inline)) void project_range_vjp(const sheetbend_pac
       if (damped) Strip(r.C_r_bar, n, rows).add(j, own.C_r[j]);
     }
   };
-  overlapped(begin, end, gather, reverse);
+  for (long n = begin; n < end; ++n) reverse(n, gather(n));
 }
 
 template <class K, Layout layout>

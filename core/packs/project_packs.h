@@ -51,14 +51,15 @@ void load_values(const double* values, bool damped, long n, Element<K, Register>
 }
 
 // What the first of two stages may hand on in registers; more would be copied through memory.
-inline constexpr std::size_t most_handed_on = 30 * sizeof(Register);
+inline constexpr std::size_t most_handed_on = 22 * sizeof(Register);
 
-// Runs second(n, first(n)) for every n. With registers to spare, the first of the next place comes before the second of this one: what takes
-// long in the first (square roots, divisions) then overlaps the loads and stores around it. Places of one color share no particle.
-template <class First, class Second>
+// Runs second(n, first(n)) for every n. With registers to spare, across a color the first of the next place comes before the second of this one: what
+// takes long in the first (square roots, divisions) then overlaps the loads and stores around it. Places of one color share no particle.
+template <Layout layout, class First, class Second>
 inline __attribute__((always_inline)) void overlapped(long begin, long end, First&& first, Second&& second) {
   if (begin >= end) return;
-  if constexpr (register_lanes == 8 && sizeof(first(begin)) <= most_handed_on) {
+  if constexpr (layout == sheetbend_packs::across_color && register_lanes == 8 &&
+                sizeof(first(begin)) <= most_handed_on) {
     auto now = first(begin);
     for (long n = begin; n + 1 < end; ++n) {
       auto next = first(n + 1);  // not const: gcc keeps const aggregates in memory
@@ -117,7 +118,7 @@ inline __attribute__((always_inline)) void project_range(const sheetbend_packs::
     unrolled<K::dofs>([&](int d) { moved[d] = at.x[d] + e.w[d / 3] * correction.push[d]; });
     unrolled<K::arity>([&](int k) { particles.store(f.rows, k, moved + 3 * k, nullptr); });
   };
-  overlapped(begin, end, evaluate, correct);
+  overlapped<layout>(begin, end, evaluate, correct);
 }
 
 // Calls f with whether the constraints are damped: as a constant for the hot kinds, those with a geometry of their own (the others would only
