@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
@@ -19,7 +20,10 @@ from .text import table
 Array = np.ndarray
 Piece = tuple[dict[str, Any], float]
 """Keys of a recording that is a part of one, and when it begins."""
+SEEN_ASKEW = 0.02  # the same of three arms, which a rope is told from by how it bends
+ASKEW = 2e-3  # of an arm, by which its length changes beyond noise, from which on the view is not square
 FLAT, STRAIGHT = 0.02, 0.01  # of an arm: how far it may leave its plane, and how much its length may change
+BENDS = 0.6  # of l theta^2/24, by which a line gets shorter where it turns, from which on it is a rope: those 1 to 2
 HANGS = 0.5  # of an arm: how far its end is below the pivot on average, at least, where that tells what is up
 PIECES = {1: (3.0, 5.0), 2: (2.0, 2.0), 3: (1.0, 1.0)}  # s that are fitted and predicted at most, by arms: two diverge
 ARMS = {1: ["arm"], 2: ["upper", "lower"], 3: ["upper", "middle", "lower"]}
@@ -54,6 +58,13 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     ]
     if len(arms) > 1:
         unknown.append("how the arms that hang share a mass at their hinges: it moves like a part of either one")
+    apart = max(_change(s, a, b) for a, b in pairwise(joints))
+    if apart > ASKEW:
+        unknown.append(
+            f"where the camera is: the arms seem to change their lengths by {100 * apart:.1g} % (1 sd). Its view is "
+            "not square to their plane, or its lens is not calibrated. The angles are off by as much, which the "
+            "intervals do not count where it is alike in all pieces"
+        )
     pieces, swing = _pieces(s, takes[0], len(arms)), _swing(x, r.times, joints)
     # The plane is y = 0: elsewhere rounding moves the arms out of it, and the fold of their triangles grows.
     pivot = (np.nanmean(x[:, joints[0]], axis=0) * (1.0, 0.0, 1.0)).tolist()
@@ -132,16 +143,40 @@ def _joints(s: Seen) -> list[int] | None:
         return None
     order, left = [s.still[0]], set(range(count)) - set(s.still)
     while left:
-        steady = [k for k in left if np.nanstd(_distance(x, order[-1], k)) < STRAIGHT * s.apart[order[-1], k]]
+        steady = [k for k in left if _change(s, order[-1], k) < (STRAIGHT if count < 4 else SEEN_ASKEW)]
         if len(steady) > 1:  # arms that swing as one
-            steady = [k for k in steady if _rigid(s, order[-1], k)]
+            rigid = [k for k in steady if _rigid(s, order[-1], k)]
+            steady = rigid if rigid or count < 4 else [min(steady, key=lambda k: s.apart[order[-1], k])]
         if len(steady) != 1:
             return None
         order.append(steady[0])
         left.remove(steady[0])
-    if count == 4 and not all(_rigid(s, a, b) for a, b in pairwise(order)):  # a rope almost keeps these distances
-        return None
+    if count == 4 and not all(_rigid(s, a, b) for a, b in pairwise(order)) and _bends(x[:, order]):
+        return None  # a rope almost keeps these distances
     return order
+
+
+def _change(s: Seen, a: int, b: int) -> float:
+    """How much the distance of two markers changes, relative to it, beyond what noise makes."""
+    by_noise = math.sqrt(2.0) * s.noise
+    spread = float(np.nanstd(_distance(s.recording.positions, a, b)))
+    return math.sqrt(max(spread**2 - by_noise**2, 0.0)) / float(s.apart[a, b])
+
+
+def _bends(x: Array) -> bool:
+    """Whether a line of markers (frames, markers, 3) gets shorter between the inner ones where it turns, as a rope
+    does: by l theta^2/24 where a length l turns by theta. Between arms it turns at the hinges alone; where a camera
+    looks at their plane askew, their lengths change otherwise."""
+    links = np.diff(x, axis=1)
+    lengths = np.linalg.norm(links, axis=2)
+    ways = links / lengths[..., None]
+    turns = np.arccos(np.clip((ways[:, 1:] * ways[:, :-1]).sum(axis=2), -1.0, 1.0)) ** 2
+    inner = lengths[:, 1:-1]
+    shorter = np.nanmean(inner, axis=0) * 0.5 * (turns[:, 1:] + turns[:, :-1]) / 24.0
+    seen = np.isfinite(shorter).all(axis=1)
+    shorter, inner = (a[seen] - a[seen].mean(axis=0) for a in (shorter, inner))
+    share = -(shorter * inner).sum(axis=0) / np.maximum(np.square(shorter).sum(axis=0), np.finfo(float).tiny)
+    return bool(np.max(share) > BENDS)
 
 
 def _upright(take: Take, joints: list[int]) -> bool:
