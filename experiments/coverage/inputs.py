@@ -59,6 +59,13 @@ def rope(unknown: bool) -> sb.Scene:
     return scene
 
 
+def draft(unknown: bool) -> sb.Scene:
+    scene = rope(False)
+    if unknown:
+        sb.add_unknown_force(scene, scene.ropes["rope"], scale=0.05, spacing=0.05, duration=1.0)
+    return scene
+
+
 def flag(unknown: bool) -> sb.Scene:
     mesh = sb.mesh.grid(0.3, 0.2, 6, 4, pattern="one_way")
     scene = sb.Scene("flag")
@@ -74,6 +81,9 @@ def flag(unknown: bool) -> sb.Scene:
 MOTIONS = {
     "rope": Motion(
         "a force on a rope", rope, sb.Solver(h=1 / 600), 61, 60.0, 0.02, 0.08, ("rope_EI", "rope_bend_damping")
+    ),
+    "draft": Motion(
+        "a draft along a rope", draft, sb.Solver(h=1 / 600), 61, 60.0, 0.05, 0.1, ("rope_EI", "rope_bend_damping")
     ),
     "flag": Motion(
         "a wind at a flag", flag, sb.Solver(h=0.005, method="newton"), 31, 50.0, 0.5, 0.1, ("cloth_bending",)
