@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import sheetbend as sb
+from wrong_calls_beside import BESIDE
 
 Call = tuple[Callable[..., Any], dict[str, Any]]
 TIMES = [0.0, 0.01, 0.02]
@@ -859,4 +860,4 @@ FITS: dict[str, Callable[[], Call]] = {
     ),
 }
 
-CALLS = {**SCENE, **OBJECTS, **RECORDINGS, **MOTION, **FITS}
+CALLS = {**SCENE, **OBJECTS, **RECORDINGS, **MOTION, **FITS, **BESIDE}

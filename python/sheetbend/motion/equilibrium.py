@@ -84,6 +84,7 @@ class Equilibrium:
 
         Raises:
             SceneError: wrong shapes, no such group or volume.
+            NoEquilibriumError: the derivative is not unique there.
         """
         return self.by_name(self.input_gradient(positions_bar, forces_bar, pressures_bar))
 
@@ -104,6 +105,7 @@ class Equilibrium:
 
         Raises:
             SceneError: wrong shapes, no such group or volume.
+            NoEquilibriumError: the derivative is not unique there.
         """
         x_bar = (
             None
@@ -117,7 +119,7 @@ class Equilibrium:
             ).ravel()
         )
         if forces_bar is None and pressures_bar is None:
-            return self.solution.vjp(x_bar, None)
+            return self._vjp(x_bar, None)
         lambda_bar = np.zeros(len(self.solution.multipliers))
         forces, pressures = forces_by_group(self.scene, lambda_bar), pressures_by_volume(self.scene, lambda_bar)
         for argument, bars in (("forces_bar", forces_bar), ("pressures_bar", pressures_bar)):
@@ -131,7 +133,13 @@ class Equilibrium:
             if name not in pressures:
                 raise SceneError(f"pressures_bar.{name}", "is no volume", name, f"use one of {sorted(pressures)}")
             pressures[name][...] = finite(f"pressures_bar.{name}", given, (), SceneError)
-        return self.solution.vjp(x_bar, lambda_bar)
+        return self._vjp(x_bar, lambda_bar)
+
+    def _vjp(self, x_bar: np.ndarray | None, lambda_bar: np.ndarray | None) -> np.ndarray:
+        try:
+            return self.solution.vjp(x_bar, lambda_bar)
+        except _core.NoEquilibrium as error:
+            raise NoEquilibriumError(f"{self.scene.name}: {error}") from error
 
     def by_name(self, inputs_bar: np.ndarray) -> dict[str, float]:
         """A gradient with respect to the named quantities from one by the flat inputs."""

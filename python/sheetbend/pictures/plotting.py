@@ -12,7 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ..arrays.checks import numbers
 from ..arrays.timeseries import Array
 from ..doubts.prediction import Comparison
 from ..errors import InputError
@@ -84,7 +86,7 @@ def plot_trajectories(
     Raises:
         InputError: arrays that do not match, or another number of axes than of panels.
     """
-    _same_shape(measured, simulated, times)
+    measured, simulated, times = _same_shape(measured, simulated, times)
     names = list(markers) or [f"m{index}" for index in range(measured.shape[1])]
     shown = np.unique(np.linspace(0, measured.shape[1] - 1, min(_MOST_PANELS, measured.shape[1])).astype(int))
     axis = _liveliest(measured) if axis is None else axis
@@ -242,7 +244,7 @@ def plot_residuals(
     Raises:
         InputError: arrays that do not match, or no single axes.
     """
-    _same_shape(measured, simulated, times)
+    measured, simulated, times = _same_shape(measured, simulated, times)
     names = list(markers) or [f"m{index}" for index in range(measured.shape[1])]
     gap = 1e3 * np.linalg.norm(measured - simulated, axis=2)
     seen = np.isfinite(gap)
@@ -286,9 +288,12 @@ def _liveliest(measured: Array) -> int:
     return int(np.argmax(np.nansum(np.nanvar(measured, axis=0), axis=0)))
 
 
-def _same_shape(measured: Array, simulated: Array, times: Array) -> None:
-    if measured.ndim != 3 or measured.shape[2] != 3 or measured.shape != simulated.shape:
-        shapes = (measured.shape, simulated.shape)
-        raise InputError("measured", "must match simulated", shapes, "give both as (frames, markers, 3)")
-    if times.shape != measured.shape[:1]:
-        raise InputError("times", "must match the frames", times.shape, f"give shape ({measured.shape[0]},)")
+def _same_shape(measured: ArrayLike, simulated: ArrayLike, times: ArrayLike) -> tuple[Array, Array, Array]:
+    """The three as arrays."""
+    given = {"measured": measured, "simulated": simulated, "times": times}
+    x, y, t = (numbers(field, values, InputError) for field, values in given.items())
+    if x.ndim != 3 or x.shape[2] != 3 or x.shape != y.shape:
+        raise InputError("measured", "must match simulated", (x.shape, y.shape), "give both as (frames, markers, 3)")
+    if t.shape != x.shape[:1]:
+        raise InputError("times", "must match the frames", t.shape, f"give shape ({x.shape[0]},)")
+    return x, y, t

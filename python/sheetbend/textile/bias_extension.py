@@ -12,6 +12,7 @@ from ..mesh import grid
 from ..motion.equilibrium import Equilibrium
 from ..objects.fabric import Fabric
 from ..scene.scene import Array
+from .arguments import check_specimen
 from .flat import flat_rest, jaw, jaw_force, specimen, travel, turned
 from .reading import GRAM_FORCE, Reading, combined
 
@@ -56,11 +57,12 @@ def bias_extension(
         InputError: the specimen is too short, or pulled beyond what a trellis can do.
         NoEquilibriumError: the specimen comes to no rest.
     """
+    check_specimen("bias_extension", fabric, {"length": length, "width": width, "extension": extension}, cells)
     if length < 2.0 * width:
         raise InputError("length", "must be at least twice the width", length, "take a longer specimen")
     free = length - width
     stretch = (free + extension) / (math.sqrt(2.0) * free)
-    if not extension > 0.0 or stretch >= 1.0:
+    if stretch >= 1.0:
         limit = (math.sqrt(2.0) - 1.0) * free
         raise InputError("extension", f"must lie between 0 and {limit:.4g} m", extension, "pull less")
     trellis = math.pi / 2.0 - 2.0 * math.acos(stretch)

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays.checks import check_positive
 from ..mesh import grid
 from ..motion.equilibrium import Equilibrium, equilibrium
 from ..objects.cloth import add_cloth
 from ..objects.fabric import Fabric
 from ..scene.scene import Array, Scene
+from .arguments import check_specimen
 from .flat import turned, warp_angle
 from .reading import Reading, combined
 from .root import root
@@ -60,7 +60,8 @@ def cantilever(
         SceneError: the width or the angle is not positive.
         NoEquilibriumError: the strip comes to no rest.
     """
-    check_positive("cantilever", {"width": width, "angle": angle}, {})
+    check_specimen("cantilever", fabric, {"width": width, "angle": angle}, cells)
+    warp_angle(along)
     stiff = fabric.bending_weft if along == "weft" and fabric.bending_weft is not None else fabric.bending
     guess = (_CHORD_GAMMA * stiff / (fabric.density * GRAVITY)) ** (1.0 / 3.0)
 

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..arrays.checks import finite
+from ..arrays.checks import check_count, check_kind, finite, is_list
 from ..arrays.timeseries import Array
 from ..errors import InputError
 
@@ -16,6 +16,7 @@ TESTS = ("tension", "shear", "bending")
 _TURN = 0.05  # of the whole range: what a specimen must go back by before it counts as unloading
 _SLACK = 0.05  # of the largest load: below it a specimen counts as unloaded
 _POINTS = 100  # of a skeleton
+_MOST_POINTS = 10**6  # of a mean
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,6 +215,7 @@ def mean_curve(curves: Sequence[Curve], way: str = "loading", *, cycle: int = 0,
     Raises:
         InputError: no curves, curves of different tests, or without that cycle or way.
     """
+    check_count("points", points, 2, _MOST_POINTS, InputError)
     ways = [chosen(curve, cycle).way(way) for curve in same_test(curves)]
     low = max(float(w.deformation.min()) for w in ways)
     high = min(float(w.deformation.max()) for w in ways)
@@ -229,7 +231,10 @@ def chosen(curve: Curve, cycle: int) -> Cycle:
     Raises:
         InputError: it has fewer.
     """
+    check_kind("curve", curve, Curve, "read the file with textile.read_curves")
     cycles = curve.cycles()
+    if isinstance(cycle, bool) or not isinstance(cycle, int | np.integer):
+        raise InputError("cycle", "must be a whole number", cycle, "count from 0; -1 is the last")
     if not -len(cycles) <= cycle < len(cycles):
         raise InputError(
             "cycle", f"is none of the {len(cycles)} of {curve.name}", cycle, "count from 0; -1 is the last"
@@ -239,7 +244,9 @@ def chosen(curve: Curve, cycle: int) -> Cycle:
 
 def same_test(curves: Sequence[Curve]) -> Sequence[Curve]:
     """The curves, at least one, all of one test."""
-    if not curves:
+    if not is_list(curves) or not all(isinstance(curve, Curve) for curve in curves):
+        raise InputError("curves", "must be a list of curves", curves, "read the files with textile.read_curves")
+    if not len(curves):
         raise InputError("curves", "is empty", 0, "give at least one curve")
     tests = sorted({curve.test for curve in curves})
     if len(tests) > 1:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arrays.checks import check_kind
 from ..arrays.timeseries import Array
 from ..errors import InputError, RecordingError
 from ..files.door import reading
@@ -64,6 +65,8 @@ def read_curves(
     """
     if test not in TESTS:
         raise InputError("test", "is unknown", test, f"use one of {', '.join(TESTS)}")
+    for field, given in (("columns", columns), ("units", units)):
+        check_kind(field, {} if given is None else given, Mapping, "give a mapping from roles")
     choice = Choice(dict(columns or {}), dict(units or {}))
     with reading(path):
         return _curves(Path(path), test, length, width, choice, decimal)

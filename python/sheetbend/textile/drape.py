@@ -17,6 +17,7 @@ from ..objects.cloth import add_cloth
 from ..objects.fabric import Fabric
 from ..scene.colliders import Cylinder
 from ..scene.scene import Array, Scene
+from .arguments import check_specimen
 from .reading import Reading, combined
 from .shadow import Shadow, shadow
 
@@ -99,6 +100,7 @@ def drape(
         InputError: a friction that is not positive, or no cover on a cloth that is held.
         NoEquilibriumError: no start leads to a state of rest.
     """
+    check_specimen("drape", fabric, {"diameter": diameter, "plate": plate}, rings)
     _check_plates(friction, cover)
     states: list[DrapeState] = []
     lost = []
@@ -136,6 +138,7 @@ def drape_scene(
         MeshError: plates as large as the cloth, or a number of rings of which none fits the plates' edge.
         InputError: a friction that is not positive, or no cover on a cloth that is held.
     """
+    check_specimen("drape", fabric, {"diameter": diameter, "plate": plate}, rings)
     _check_plates(friction, cover)
     mesh = _mesh(diameter / 2.0, plate / 2.0, rings)
     scene = Scene("drape")

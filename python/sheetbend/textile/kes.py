@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays.checks import check_kind
 from ..errors import InputError
 from .curve import Curve, Cycle, chosen
 from .reading import GRAM_FORCE, Reading
@@ -145,6 +146,7 @@ def check_test(curve: Curve, test: str) -> None:
     Raises:
         InputError: names both.
     """
+    check_kind("curve", curve, Curve, "read the file with textile.read_curves")
     if curve.test != test:
         raise InputError(curve.name, f"is no test of {test}", curve.test, "read the file with that test=")
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays.checks import check_positive
 from ..mesh import grid
 from ..motion.equilibrium import Equilibrium
 from ..objects.cloth import Cloth
 from ..objects.fabric import Fabric
 from ..quantities.quantities import Term
 from ..scene.scene import Array, Scene
+from .arguments import check_specimen
 from .flat import flat_rest, jaw, specimen
 from .reading import Reading, combined
 
@@ -50,7 +50,7 @@ def picture_frame(fabric: Fabric, *, angle: float = 20.0, side: float = 0.2, cel
         SceneError: the angle or the side is not positive.
         NoEquilibriumError: the fabric comes to no rest.
     """
-    check_positive("picture_frame", {"angle": angle, "side": side}, {})
+    check_specimen("picture_frame", fabric, {"angle": angle, "side": side}, cells)
     half = math.radians(angle) / 2.0
     scene, cloth = specimen(fabric, grid(side, side, cells, cells))
     a, b = cloth.mesh.vertices[:, :2].T

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import is_number
+from ..arrays.checks import check_count, is_list, is_number
 from ..errors import InputError
 from ..minimum.linear_algebra import one_blas_thread
 from ..objects.fabric import Fabric
@@ -37,6 +37,7 @@ WEIGHTS = (0.0, 1.0, 2.0, 3.0)
 
 _SPECIMEN = (0.05, 0.2)  # m, length and width of KES-FB1, where curves do not tell theirs
 _LEVELS = 5
+_MOST_LEVELS = 1000
 _CLASS = 0.005  # class 0.5 of ISO 7500-1 and ISO 9513
 
 
@@ -72,6 +73,7 @@ def pulled(
     """
     warp_angle(along)
     checked_pulls(curves)
+    _check_error(error)
     ways = {c.name: chosen(c, cycle).way(way) for c in curves}
     length, width = _specimen(curves)
     note, found = _left_out(curves, cycle, way), []
@@ -129,6 +131,9 @@ def fit_pull(
         NoEquilibriumError: the start comes to no rest.
         MissingExtraError: scipy is not installed.
     """
+    if not isinstance(law, str) and not (is_list(law) and all(isinstance(name, str) for name in law)):
+        raise InputError("law", "must be a name or a list of names", law, f"use some of {', '.join(LAWS)}")
+    _check_error(error)
     offered = _offered(law, poisson)
     _check_options(offered, weights, poisson)
     checked_pulls(curves)
@@ -209,12 +214,18 @@ def _check_options(offered: Sequence[str], weights: float | str, poisson: float)
     if "spline" in offered and (len(offered) > 1 or weights == "chosen"):
         fix = "leave it out: a spline cannot foresee, so nothing can be chosen with it"
         raise InputError("law", "is a spline", list(offered), fix)
-    if not (weights == "chosen" or (is_number(weights) and 0.0 <= float(weights) <= 10.0)):
+    power = is_number(weights) and 0.0 <= float(weights) <= 10.0
+    if not (power or (isinstance(weights, str) and weights == "chosen")):
         raise InputError("weights", "must be a power from 0 to 10, or 'chosen'", weights, "give 0 for even weights")
     if not (is_number(poisson) and -1 < poisson < 1):
         raise InputError("poisson", "must lie between -1 and 1", poisson, "give sqrt(nu_uv nu_vu)")
     if poisson and any(name in NUMBERS for name in offered):
         raise InputError("poisson", "is of the simulation, which has no law that locks", poisson, "give 0")
+
+
+def _check_error(error: float) -> None:
+    if not (is_number(error) and error >= 0.0):
+        raise InputError("error", "must not be negative", error, "give the machine's relative error, such as 0.005")
 
 
 def _specimen(curves: Sequence[Curve]) -> tuple[float, float]:
@@ -242,6 +253,7 @@ def checked_pulls(curves: Sequence[Curve]) -> None:
 
 def mean_loads(curves: Sequence[Curve], cycle: int, way: str, levels: int) -> np.ndarray:
     """(levels,) N/m of the mean curve at even shares of its strain, up to the load that all reach."""
+    check_count("levels", levels, 1, _MOST_LEVELS, InputError)
     mean = mean_curve(curves, way, cycle=cycle)
     top = min(float(chosen(c, cycle).way(way).load.max()) for c in curves)
     start, end = mean.deformation[0], mean.deformation[mean.load <= top][-1]

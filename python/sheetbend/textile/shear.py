@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..arrays.checks import check_positive
+from ..arrays.checks import finite
+from ..errors import InputError
 from ..mesh import grid
 from ..motion.equilibrium import Equilibrium
 from ..objects.fabric import Fabric
+from .arguments import check_specimen
 from .flat import flat_rest, jaw, jaw_force, specimen, strip_strain, travel, turned, warp_angle
 from .reading import GRAM_FORCE, Reading, combined
 from .root import root
@@ -59,7 +61,9 @@ def shear(
         SceneError: a size or the tension is not positive.
         NoEquilibriumError: the tension is not reached.
     """
-    check_positive("shear", {"tension": tension, "width": width, "gauge": gauge}, {})
+    check_specimen("shear", fabric, {"tension": tension, "width": width, "gauge": gauge}, cells)
+    if len(finite("angles", angles, (2,), InputError)) and angles[0] == angles[1]:
+        raise InputError("angles", "must differ", angles, "give two angles in degrees")
     mesh = grid(width, gauge, max(2, round(cells * width / gauge)), cells)
     scene, cloth = specimen(fabric, turned(mesh, 90.0 - warp_angle(along)))
     x = mesh.vertices

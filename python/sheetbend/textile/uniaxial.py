@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..arrays.checks import check_positive
 from ..mesh import grid
 from ..motion.equilibrium import Equilibrium
 from ..motion.values import elastic_energy, elastic_energy_gradient
 from ..objects.fabric import Fabric
+from .arguments import check_specimen
 from .flat import flat_rest, jaw, jaw_force, specimen, strip_strain, travel, turned, warp_angle
 from .reading import GRAM_FORCE, Reading, combined
 from .root import root
@@ -55,7 +55,7 @@ def uniaxial(
         SceneError: a size or the load is not positive.
         NoEquilibriumError: the load is not reached.
     """
-    check_positive("uniaxial", {"load": load, "width": width, "gauge": gauge}, {})
+    check_specimen("uniaxial", fabric, {"load": load, "width": width, "gauge": gauge}, cells)
     scene, cloth = specimen(
         fabric, turned(grid(gauge, width, cells, max(2, round(cells * width / gauge))), warp_angle(along))
     )

@@ -13,6 +13,7 @@ from .. import _core
 from ..errors import NoEquilibriumError, SceneError, refusal
 from ..motion.core_terms import forces_by_group, pressures_by_volume
 from ..motion.equilibrium import whole_start
+from ..scene.given import check_scene
 from ..scene.scene import Scene
 from .function import respond
 from .inputs import InputMap, dtype_of
@@ -113,8 +114,9 @@ def equilibrium(
             negative stiffness, mass or length; the message names the quantity and the scene of the batch.
         NoEquilibriumError: not converged; says how far it came and what to try.
     """
+    check_scene(scene)
     x = None if start is None else whole_start(scene, start, scene.compiled.inputs())
-    flat = InputMap(scene)(values or {}, inputs or {})
+    flat = InputMap(scene)(values, inputs)
     batch, dofs = flat.shape[:-1], scene.compiled.core.dofs
     equilibria = Equilibria(scene, x, stable, threads, tuple(inputs or ()))
     states = respond(equilibria, flat.reshape(-1, flat.shape[-1])).reshape(*batch, -1)

@@ -16,6 +16,7 @@ from ..experiment.force_readings import read_at, readings_problem
 from ..motion.core_terms import divergence
 from ..motion.solver import Solver
 from ..scene.scene import Scene
+from .inputs import given_by_name
 
 
 def forces(
@@ -42,7 +43,7 @@ def forces(
         InputError: times, particles, tensors or fields that do not suit.
         DivergenceError: as `sheetbend.simulate`.
     """
-    given = dict(values or {})
+    given = given_by_name("values", values)
     tensors = {name: value for name, value in given.items() if isinstance(value, Tensor)}
     for name, value in tensors.items():
         if value.numel() != 1 or value.dtype != torch.float64 or value.device.type != "cpu":

@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 from torch.autograd import Function
 
+from ..arrays.checks import check_kind
 from ..errors import InputError, choices
 from ..quantities.quantities import FUNCTIONS
 from ..scene.scene import Scene
@@ -27,6 +28,16 @@ _TORCH: Mapping[str, Callable[[Tensor], Tensor]] = {
     "over_one_plus": lambda x: 1.0 / (1.0 + x),
     "over_one_minus_twice": lambda x: 1.0 / (1.0 - 2.0 * x),
 }
+
+
+def given_by_name(field: str, given: Mapping[str, Any] | None) -> dict[str, Any]:
+    """What was given by name; nothing for None.
+
+    Raises:
+        InputError: it is no mapping.
+    """
+    check_kind(field, {} if given is None else given, Mapping, "give a mapping from names, or leave it out")
+    return dict(given or {})
 
 
 class ParameterMap:
@@ -139,13 +150,16 @@ class InputMap:
         self._theta = torch.tensor(compiled.theta, dtype=torch.float64)
         self._map = ParameterMap(scene)
 
-    def __call__(self, values: Mapping[str, Tensor | float], arrays: Mapping[str, Tensor]) -> Tensor:
+    def __call__(
+        self, values: Mapping[str, Tensor | float] | None, inputs: Mapping[str, Tensor] | None = None
+    ) -> Tensor:
         """Quantities (*batch,) and arrays (*batch, ...), whose batch dimensions broadcast, to (*batch, total).
 
         Raises:
             InputError: unknown name, not a tensor, no floating type, not on the CPU, wrong shape, batches that do not
                 broadcast, arrays without effect in this scene, values outside the range of their quantity.
         """
+        values, arrays = given_by_name("values", values), given_by_name("inputs", inputs)
         batches = {name: self._batch_of_value(name, value) for name, value in values.items()}
         batches |= {name: self._batch_of_array(name, array) for name, array in arrays.items()}
         batch = broadcast(batches)

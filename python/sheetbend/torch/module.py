@@ -9,8 +9,10 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
+from ..arrays.checks import is_list
 from ..errors import InputError, choices
 from ..motion.solver import Solver
+from ..scene.given import check_scene
 from ..scene.scene import Scene
 from .simulate import Simulation
 
@@ -32,7 +34,8 @@ class SceneModule(nn.Module):
 
     def __init__(self, scene: Scene, times: ArrayLike, solver: Solver | None = None, *, learn: Sequence[str]) -> None:
         super().__init__()
-        if isinstance(learn, str) or len(learn) == 0:
+        check_scene(scene)
+        if not is_list(learn) or len(learn) == 0 or not all(isinstance(name, str) for name in learn):
             fix = f"name some of: {', '.join(scene.quantities)}"
             raise InputError("learn", "must be a list of quantities", learn, fix)
         self._simulation = Simulation(scene, times, solver)

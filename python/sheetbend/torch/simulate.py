@@ -9,10 +9,12 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
+from ..arrays.checks import numbers
 from ..errors import InputError
 from ..motion.core_terms import substeps
 from ..motion.rollouts import Rollouts
 from ..motion.solver import Solver
+from ..scene.given import check_scene
 from ..scene.scene import Scene
 from .function import respond
 from .inputs import InputMap, dtype_of
@@ -22,6 +24,7 @@ class Simulation:
     """A scene, its frame times and its solver, prepared for many calls; see `simulate` for the arguments."""
 
     def __init__(self, scene: Scene, times: ArrayLike, solver: Solver | None = None, nodes: bool = False) -> None:
+        check_scene(scene)
         self.scene, self.solver = scene, Solver.given(solver)
         self._shown = scene.node_count if nodes else scene.particle_count
         self._steps = substeps(times, self.solver.h)
@@ -34,7 +37,7 @@ class Simulation:
         inputs: Mapping[str, Tensor] | None = None,
         lengths: ArrayLike | None = None,
     ) -> Tensor:
-        flat = self._inputs(values or {}, inputs or {})
+        flat = self._inputs(values, inputs)
         batch = flat.shape[:-1]
         keep_tape = torch.is_grad_enabled() and flat.requires_grad
         own = None if lengths is None else _checked(lengths, batch, len(self._steps))
@@ -95,6 +98,7 @@ def simulate(
 
 def _checked(lengths: ArrayLike, batch: tuple[int, ...], frames: int) -> np.ndarray:
     """(scenes,)"""
+    numbers("lengths", lengths, InputError)
     own = np.asarray(lengths)
     if own.shape != batch or not np.issubdtype(own.dtype, np.integer):
         fix = f"give {batch}, of the batch; without one cut the times"

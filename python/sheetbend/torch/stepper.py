@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..motion.core_terms import divergence
 from ..motion.rollouts import Rollouts
 from ..motion.solver import Solver
+from ..scene.given import check_scene
 from ..scene.scene import Scene
 from .function import respond
 from .inputs import InputMap, broadcast
@@ -57,6 +58,7 @@ class Stepper:
     def __init__(self, scene: Scene, solver: Solver | None = None, *, dtype: torch.dtype = torch.float64) -> None:
         if not isinstance(dtype, torch.dtype) or not dtype.is_floating_point:
             raise InputError("dtype", "must be a floating type of torch", dtype, "give torch.float64 or torch.float32")
+        check_scene(scene)
         self.scene, self.solver, self.dtype = scene, Solver.given(solver), dtype
         compiled = scene.compiled
         self._layout, self._check = compiled.layout, compiled.domain.check_inputs
