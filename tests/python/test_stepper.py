@@ -277,3 +277,15 @@ def test_bad_arguments_are_refused() -> None:
         Stepper(stepper.scene, dtype=torch.int32)
     with pytest.raises(sb.DivergenceError):
         stepper(State(torch.full_like(state.numbers, 1e200)))
+
+
+def test_an_array_that_the_scene_lacks_is_refused_with_what_gives_it_one() -> None:
+    scene = sb.rope(0.5, 10, density=0.05, EI=1e-3, pinned=(0,))
+    stepper = Stepper(scene, sb.Solver(h=1 / 200))
+    state = stepper.start()
+    with pytest.raises(sb.InputError, match=r"force: cannot be given .*call scene\.add_force\(part"):
+        stepper(state, force=torch.zeros(11, 3))
+    with pytest.raises(sb.InputError, match=r"inputs\.force: is no input array .*call scene\.add_force"):
+        simulate(scene, [0.1], sb.Solver(h=1 / 200), inputs={"force": torch.zeros(1, 11, 3)})
+    with pytest.raises(sb.InputError, match=r"forces: cannot be given .*give some of: mass"):
+        stepper(state, forces=torch.zeros(11, 3))

@@ -149,7 +149,7 @@ def _picture(motion: Motion, shown: Array, title: str) -> tuple[Figure, Any]:
     reach += [lines[shown].reshape(-1, 3) for lines, _ in solids]
     if motion.measured is not None:
         reach.append(seen_points(motion.measured[shown].reshape(-1, 3)))
-        key(figure, [("measured markers", WARM), ("to where they should be", INK)])
+        key(figure, [("measured markers", WARM), ("line to the simulated place", INK)])
     box_in_space(panel, np.vstack(reach), motion.scene.gravity)
     clock = figure.text(0.02, 0.02, "", color=INK, fontsize=10)
 

@@ -29,6 +29,14 @@ _TORCH: Mapping[str, Callable[[Tensor], Tensor]] = {
     "over_one_minus_twice": lambda x: 1.0 / (1.0 - 2.0 * x),
 }
 
+NEEDS = {
+    "force": "scene.add_force(particles, forces)",
+    "boundary": "scene.drive(particles, times, positions)",
+    "wind": "scene.add_air(triangles, ...)",
+    "pressure": "scene.add_pressure(triangles, ...)",
+}
+"""What gives a scene the arrays that it may lack."""
+
 
 def given_by_name(field: str, given: Mapping[str, Any] | None) -> dict[str, Any]:
     """What was given by name; nothing for None.
@@ -188,7 +196,8 @@ class InputMap:
         field = f"inputs.{name}"
         present = [n for n, (_, size) in self._given.items() if size > 0]
         if name not in present:
-            raise InputError(field, "is no input array of the scene", name, choices(name, present))
+            fix = f"call {NEEDS[name]} first" if name in NEEDS else choices(name, present)
+            raise InputError(field, "is no input array of the scene", name, fix)
         if name in self._without_effect:
             raise InputError(field, "has no effect on this scene", name, self._without_effect[name])
         shape, wanted = _dense(field, array), self._shapes[name]

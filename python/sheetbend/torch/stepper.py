@@ -17,7 +17,7 @@ from ..motion.solver import Solver
 from ..scene.given import check_scene
 from ..scene.scene import Scene
 from .function import respond
-from .inputs import InputMap, broadcast
+from .inputs import NEEDS, InputMap, broadcast
 from .state import State
 from .substep import Core, take_substep
 
@@ -167,7 +167,8 @@ class Stepper:
         possible = [n for n in self._shapes if n not in ("position", "velocity")]
         for name in names:
             if name not in possible:
-                raise InputError(name, "cannot be given for a substep", name, f"give some of: {', '.join(possible)}")
+                fix = f"call {NEEDS[name]} first" if name in NEEDS else f"give some of: {', '.join(possible)}"
+                raise InputError(name, "cannot be given for a substep", name, fix)
         held = frozenset(names) & frozenset(_MOTIONS)
         places = [self._place(name) for name in names]
         early = not set(names) <= {*_MOTIONS, "gravity", "pressure"}
