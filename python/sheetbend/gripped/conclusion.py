@@ -23,9 +23,10 @@ from .climb import Climb
 from .descent import bearable, descend, negligible
 from .ladder import TWIST, Rung
 from .model import NAME, RopeModel
-from .motion import GrippedMotion
+from .motion import Array, GrippedMotion
 from .offsets import offset_reach
 from .over_density import as_quantities
+from .own_rest import OwnRest, own_rest
 from .pieces import experiments_of, problem_of, starting
 from .start import whole
 from .steps import Rope
@@ -43,9 +44,9 @@ def conclude(
     window: Span,
     given: Mapping[str, float],
     interrupted: bool,
-) -> tuple[Fit, dict[str, float]]:
-    """The fit to windows of these motions, and the model term of its intervals, by parameter in its unit; after Ctrl-C
-    one iteration of it, which the intervals need.
+) -> tuple[Fit, dict[str, float], OwnRest | None]:
+    """The fit to windows of these motions, the model term of its intervals, by parameter in its unit, and what rest
+    shapes that differ make of it; after Ctrl-C one iteration of it, which the intervals need.
 
     Raises:
         SheetbendError: the motion diverges.
@@ -73,11 +74,18 @@ def conclude(
         model = replace(rope.model, segments=2 * rope.model.segments)
         return checked(experiments_of(model, motions, window, values), parameters, values, threads)
 
+    differing: OwnRest | None = None
+
+    def systematic(problem: FitProblem, u: Array) -> dict[str, float]:
+        nonlocal differing
+        differing = own_rest(problem, u)
+        return _together(offset_reach(problem, u, climb.beside), spread)
+
     last = fit(
         experiments,
         parameters=starting(parameters, values),
         refine=None if interrupted else Refinement(finer=finer, linear=True),
-        systematic=lambda problem, u: _together(offset_reach(problem, u, climb.beside), spread),
+        systematic=systematic,
         windows=(),
         given=given,
         threads=threads,
@@ -90,9 +98,10 @@ def conclude(
         moved = refit.moved[f"{NAME}_EI"] / last.values[f"{NAME}_EI"]
         say(f"{refit.name} would move EI by {100 * moved:+.2g} %")
     if not interrupted:
-        return last, spread
+        return last, spread, differing
     warning = "interrupted: later rungs were not tried, and the last fit did not get to its end"
-    return replace(last, result=replace(last.result, interrupted=True, converged=False, warnings=(warning,))), spread
+    cut = replace(last, result=replace(last.result, interrupted=True, converged=False, warnings=(warning,)))
+    return cut, spread, differing
 
 
 def _at_the_end(

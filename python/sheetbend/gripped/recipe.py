@@ -175,8 +175,8 @@ def fit_rope(
     models = [replace(model, gravity=g) for g in seen.gravities]
     interrupted = _climb(climb, models, ladder, bending_lengths, max_segments, starts)
     last = everything(climb.search.whole, spans[-1][0]) if isinstance(windows, str) else spans[-1]
-    found, spread = conclude(climb, climb.search.whole, last, _given(given, marker_mass), interrupted)
-    fitted = _fitted(climb, found, spread, seen, last)
+    found, spread, own = conclude(climb, climb.search.whole, last, _given(given, marker_mass), interrupted)
+    fitted = _fitted(climb, found, spread, seen, last, [own.words] if own else [])
     return fitted if density is not None else _over_density(fitted)
 
 
@@ -232,8 +232,10 @@ def _given(given: Mapping[str, float] | None, marker_mass: float | None) -> dict
     return sds
 
 
-def _fitted(climb: Climb, found: Fit, spread: Mapping[str, float], seen: Read, last: Span) -> RopeFit:
-    """The rope where the climb ended, with what a reader must know of it."""
+def _fitted(
+    climb: Climb, found: Fit, spread: Mapping[str, float], seen: Read, last: Span, said: Sequence[str]
+) -> RopeFit:
+    """The rope where the climb ended, with what a reader must know of it, and what was said of the last fit."""
     assert climb.rope is not None
     if climb.raced:
         found = replace(found, result=replace(found.result, starts=climb.raced))
@@ -248,6 +250,7 @@ def _fitted(climb: Climb, found: Fit, spread: Mapping[str, float], seen: Read, l
         *climb.search.left_out,
         *at_bounds(rope.parameters, values, model, kept, last[0]),
         *short_links(model, values),
+        *said,
     )
     model = replace(model.at(values), beside=climb.beside, late=climb.late)
     return RopeFit(model, values, tuple(climb.steps), found, warnings, spread=spread)
