@@ -20,7 +20,6 @@ from .contacts import Contacts
 from .forces import Forces
 from .frames import Frame
 from .group import Group
-from .pieces import piece_terms
 from .volume import Volumes
 
 Array = np.ndarray
@@ -123,8 +122,7 @@ class SceneData:
     def every_term(self) -> list[Term]:
         """Those that were added, of the boundary, and of the start of bodies."""
         starts = (t for body in self.bodies.values() for t in body.start_terms())
-        contacts = self.contacts
-        between = piece_terms(contacts.pieces, contacts.pair_friction, len(contacts.contacts), contacts.weights)
+        between = self.contacts.between_pieces()
         return [*self.terms, *self.boundary.terms(), *self.forces.terms(), *starts, *between]
 
     @property
