@@ -1,3 +1,4 @@
+#include "adjoint/contact/collision_vjp.h"
 #include "adjoint/contact/impact_vjp.h"
 #include "adjoint/contact/rebound_vjp.h"
 #include "adjoint/contact/touch_vjp.h"
@@ -10,5 +11,7 @@ template Vec3<double> normal_vjp(const AnyShape&, const Vec3<double>&, const dou
 template Falling<double> rebound_vjp(const AnyShape&, double, bool, const Falling<double>&, const Rebound<double>&);
 template Flight<double> bounced_vjp(const ImpactRule&, const Flight<double>&, const Surface<double>&, double,
                                     const Flight<double>&, Surface<double>&);
+template BallPair<double> collided_vjp(const ImpactRule&, const BallPair<double>&, const BallMeeting&,
+                                       const std::array<Flight<double>, 2>&);
 
 }  // namespace sheetbend

@@ -1,6 +1,6 @@
 // The reverse of the law of contact (core/contact/law.h), by hand, over any scalar. With N = lambda_n, s = 1 - a n . u, L = mu N, e = tau/|tau| and P = I - n n^T,
 //
-//   slides:  mu' += (e . t') N,  N' += mu (e . t'),  tau' = L/|tau| (t' - (e . t') e)        sticks:  tau' = t'
+//   slides:  mu' += (e . t') N,  N' += mu (e . t'),  tau' = L/|tau| (t' - (e . t') e)        sticks:  tau' = t', 0 where mu = 0
 //   g' = P tau',  f' += g',  u' -= kappa g',  kappa' -= u . g',  n' -= (n . g) tau' + (n . tau') g         g = f - kappa u
 //   kappa' -= gap s N',  gap' = -kappa s N',  s' = -kappa gap N'
 //
@@ -34,7 +34,9 @@ LawCotangents<T> contact_force_vjp(const T& gap, const Vec3<T>& n, const Vec3<T>
   const T inverse = one / sqrt(select(c.slides, dot(tau, tau), one));
   const Vec3<T> e = inverse * tau;
   const T limit_bar = select(c.slides, dot(e, t_bar), zero);
-  const Vec3<T> tau_bar = select(c.slides, (friction * c.normal * inverse) * (t_bar - limit_bar * e), t_bar);
+  const T limit = friction * c.normal;
+  const Vec3<T> held_bar = select(limit > zero, t_bar, none);
+  const Vec3<T> tau_bar = select(c.slides, (limit * inverse) * (t_bar - limit_bar * e), held_bar);
   const T across = dot(n, tau_bar);
   const Vec3<T> trial_bar = tau_bar - across * n;
   bar.friction = limit_bar * c.normal;

@@ -175,6 +175,7 @@ class SceneReader {
       }
       spec.contacts.push_back(std::move(contact));
     });
+    if (header_.contains("collisions")) spec.balls = file_.whole_numbers("collisions");
   }
 
   // Driven particles that follow recorded markers: checked, and otherwise of no use here.

@@ -1,6 +1,7 @@
 // The reverse of ContactSource: cotangents of what a contact reads go to the states at n and n-1, to the inputs and to the inverse mass.
 #pragma once
 
+#include "adjoint/contact/collision_vjp.h"
 #include "adjoint/contact/impact_vjp.h"
 #include "adjoint/contact/rebound_vjp.h"
 #include "adjoint/contact/touch_vjp.h"

@@ -70,20 +70,27 @@ struct ImpactRule {
   bool curved;
 };
 
-// Where a flight is relative to a surface after the time t. Points of the collider's frame go straight from one pose to the other.
+// Where a flight is after the time t.
 template <class S>
-struct Approach {
-  S gap, rate;  // and its derivative
-  Vec3<S> at, normal, velocity, surface_velocity;
-  Approach(const ImpactRule& rule, const Flight<S>& f, const Surface<S>& s, const S& t) {
-    const S share = t / f.left, passed = S(1.0) - (f.left - t) / S(rule.h);
+struct Moment {
+  Vec3<S> at, velocity;
+  Moment(bool curved, const Flight<S>& f, const S& t) {
+    const S share = t / f.left;
     velocity = f.v + share * (f.v_end - f.v);
     at = f.x + share * (f.x_end - f.x);
-    Vec3<S> direction = velocity;
-    if (rule.curved)
-      at = at + (S(0.5) * share * (t - f.left)) * (f.v_end - f.v);
-    else
-      direction = (S(1.0) / f.left) * (f.x_end - f.x);
+    if (curved) at = at + (S(0.5) * share * (t - f.left)) * (f.v_end - f.v);
+  }
+};
+
+// And where it is relative to a surface. Points of the collider's frame go straight from one pose to the other.
+template <class S>
+struct Approach : Moment<S> {
+  using Moment<S>::at, Moment<S>::velocity;
+  S gap, rate;  // and its derivative
+  Vec3<S> normal, surface_velocity;
+  Approach(const ImpactRule& rule, const Flight<S>& f, const Surface<S>& s, const S& t) : Moment<S>(rule.curved, f, t) {
+    const S passed = S(1.0) - (f.left - t) / S(rule.h);
+    const Vec3<S> direction = rule.curved ? velocity : (S(1.0) / f.left) * (f.x_end - f.x);
     const auto between = [&](const Vec3<S>& a, const Vec3<S>& b) { return a + passed * (b - a); };
     const Vec3<S> z = between(s.now.in_frame(at), s.next.in_frame(at));
     S place[3], n[3];
@@ -103,9 +110,10 @@ inline bool meets(const ImpactRule& rule, const Flight<double>& f, const Surface
          !(Approach<double>(rule, f, s, 0.0).gap < 0.0);
 }
 
-// When it gets there, by bisection with steps of Newton's method.
-inline double time_of_impact(const ImpactRule& rule, const Flight<double>& f, const Surface<double>& s) {
-  double before = 0.0, after = f.left, t = 0.5 * f.left;
+// When it gets there, from outside at `before` to inside at `after`, by bisection with steps of Newton's method.
+inline double time_of_impact(const ImpactRule& rule, const Flight<double>& f, const Surface<double>& s, double before,
+                             double after) {
+  double t = 0.5 * (before + after);
   for (int turn = 0; turn < 100 && after - before > 1e-15 * f.left; ++turn) {
     const Approach<double> a(rule, f, s, t);
     (a.gap < 0.0 ? after : before) = t;
@@ -124,20 +132,32 @@ inline bool bounces(const ImpactRule& rule, const Flight<double>& f, const Surfa
   return a.rate < 0.0 && speed > 0.0 && s.restitution * speed > slowest_bounce * rule.h * pressed;
 }
 
+// A flight that a kick changes after the time t.
+template <class S>
+Flight<S> kicked(const Moment<S>& m, const Flight<S>& f, const S& t, const Vec3<S>& kick) {
+  const S left = f.left - t;
+  return {m.at, m.velocity + kick, f.x_end + left * kick, f.v_end + kick, left};
+}
+
+// What an impact adds to the velocity. Without friction what slips stays as it is, however little.
+template <class S>
+Vec3<S> kick_of(const Approach<S>& a, const Surface<S>& s) {
+  const Vec3<S> w = a.velocity - a.surface_velocity;
+  const S speed = -dot(a.normal, w);
+  const Vec3<S> slip = w + speed * a.normal;
+  const S push = (S(1.0) + s.restitution) * speed, limit = s.friction * push, squared = dot(slip, slip);
+  if (value_of(limit) == 0.0 && value_of(squared) == 0.0) return push * a.normal;
+  const bool slides = value_of(squared) > value_of(limit) * value_of(limit);
+  return push * a.normal - (slides ? (limit / sqrt(squared)) * slip : slip);
+}
+
 // The flight after the impact near the time `guess`, which one step of Newton's method makes that of a scalar with tangents.
 template <class S>
 Flight<S> bounced(const ImpactRule& rule, const Flight<S>& f, const Surface<S>& s, double guess) {
   const Approach<S> near(rule, f, s, S(guess));
   const S t = S(guess) - near.gap / near.rate;
   const Approach<S> a(rule, f, s, t);
-  const Vec3<S> w = a.velocity - a.surface_velocity;
-  const S speed = -dot(a.normal, w);
-  const Vec3<S> slip = w + speed * a.normal;
-  const S push = (S(1.0) + s.restitution) * speed, limit = s.friction * push, squared = dot(slip, slip);
-  const bool slides = value_of(squared) > value_of(limit) * value_of(limit);
-  const Vec3<S> kick = push * a.normal - (slides ? (limit / sqrt(squared)) * slip : slip);
-  const S left = f.left - t;
-  return {a.at, a.velocity + kick, f.x_end + left * kick, f.v_end + kick, left};
+  return kicked(a, f, t, kick_of(a, s));
 }
 
 }  // namespace sheetbend

@@ -49,7 +49,9 @@ ContactForce<T> contact_force(const T& gap, const Vec3<C>& n, const Vec3<T>& sli
   const T squared = dot(tau, tau);
   c.slides = c.pushes & (squared > limit * limit);
   const Vec3<T> none(zero, zero, zero);
-  c.tangential = select(c.pushes, select(c.slides, (limit / sqrt(squared)) * tau, tau), none);
+  // What has no friction slips where nothing has moved it yet, too: there tau is zero, and its derivatives must not stay.
+  const Vec3<T> held = select(limit > zero, tau, none);
+  c.tangential = select(c.pushes, select(c.slides, (limit / sqrt(squared)) * tau, held), none);
   return c;
 }
 

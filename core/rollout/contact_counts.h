@@ -9,7 +9,7 @@
 namespace sheetbend {
 
 // Of one contact. A particle that touches in the first substep has not begun to; one that bounces begins and ends. Of what touches itself with friction the
-// same of pairs.
+// same of pairs, and how often balls hit each other.
 struct ContactCounts {
   int most = 0;                    // particles that touched at once
   int began = 0, ended = 0;        // how often one did
@@ -25,8 +25,9 @@ class CountContacts {
   void look(const R& rollout) {
     const std::vector<ContactMode>& modes = rollout.contact_modes();
     for (const auto& impact : rollout.impacts()) {
-      ++counts_[impact.contact].began;
-      ++counts_[impact.contact].ended;
+      ContactCounts& count = impact.contact < 0 ? balls_ : counts_[impact.contact];
+      ++count.began;
+      ++count.ended;
     }
     const bool first = before_.empty();
     for (std::size_t c = 0; c < counts_.size(); ++c) {
@@ -51,6 +52,7 @@ class CountContacts {
 
   const std::vector<ContactCounts>& counts() const { return counts_; }
   const ContactCounts& pairs() const { return pairs_; }
+  const ContactCounts& balls() const { return balls_; }
 
  private:
   // They are in the state, in the order of keys.
@@ -78,7 +80,7 @@ class CountContacts {
   const Scene& scene_;
   std::vector<ContactCounts> counts_;
   std::vector<ContactMode> before_;
-  ContactCounts pairs_;
+  ContactCounts pairs_, balls_;
   std::vector<PairKey> touched_;
   bool looked_ = false;
 };

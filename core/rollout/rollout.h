@@ -195,10 +195,12 @@ Scenes Rollout<T, List>::find_bounced() {
   for (const auto& impact : impacts()) {
     const auto own = static_cast<Scenes>(1u << impact.lane);
     scenes |= own;
-    auto known = std::find_if(bounced_.begin(), bounced_.end(), [&](const auto& b) { return b.node == impact.node; });
-    if (known == bounced_.end())
-      known = bounced_.insert(known, {impact.node, 0, Vec3<T>(v_next_.data() + scene_.first_dof[impact.node])});
-    known->scenes |= own;
+    for (const auto& f : impact.flown()) {
+      auto known = std::find_if(bounced_.begin(), bounced_.end(), [&](const auto& b) { return b.node == f.node; });
+      if (known == bounced_.end())
+        known = bounced_.insert(known, {f.node, 0, Vec3<T>(v_next_.data() + scene_.first_dof[f.node])});
+      known->scenes |= own;
+    }
   }
   return scenes;
 }

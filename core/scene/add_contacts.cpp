@@ -53,14 +53,19 @@ void check_contact(const ContactSpec& spec, const Scene& scene, std::vector<char
   check_carried(spec.name + ".carried", spec.carried, scene, carries);
 }
 
-// Of contacts with restitution: the free particles that nothing holds, and which ones constraints hold. A soft contact of what is held gives back
-// by itself.
-void add_bouncers(Scene& s) {
+// Per node, whether constraints hold it.
+std::vector<char> held_nodes(const Scene& s) {
   std::vector<char> held(s.nodes(), false);
   for (const Group& g : s.groups)
     for (const int n : g.stencil) held[n] = true;
   for (const Volume& v : s.volumes)
     for (const int n : v.nodes) held[n] = true;
+  return held;
+}
+
+// Of contacts with restitution: the free particles that nothing holds, and which ones constraints hold. A soft contact of what is held gives back
+// by itself.
+void add_bouncers(const std::vector<char>& held, Scene& s) {
   std::map<int, std::vector<int>> contacts;
   for (std::size_t c = 0; c < s.contacts.size(); ++c) {
     Contact& contact = s.contacts[c];
@@ -78,6 +83,30 @@ void add_bouncers(Scene& s) {
     }
   }
   for (auto& [node, own] : contacts) s.bouncers.push_back({node, std::move(own)});
+}
+
+// Their radii and their restitution stand behind all others.
+void add_balls(const std::vector<int>& nodes, const std::vector<char>& held, std::size_t radii,
+               std::size_t restitutions, Scene& s) {
+  if (nodes.empty()) return;
+  const std::string field = "collisions";
+  check_nodes(field, nodes, s.nodes());
+  const std::vector<int> slot = slots(nodes, s.nodes(), field);
+  if (nodes.size() < 2) refuse(field + ": one particle. Fix: give two or more, which may hit each other");
+  s.balls.first_radius = radii;
+  s.balls.restitution = static_cast<int>(restitutions);
+  for (const int n : nodes) {
+    const std::string particle = field + ": particle " + std::to_string(n);
+    if (!s.is_place[n])
+      refuse(field + ": node " + std::to_string(n) + " is " + a_direction(s, n) + ". Fix: use particles");
+    if (s.role[n] != Role::free)
+      refuse(particle + " is held. Fix: leave it out, and let the others touch a sphere there");
+    if (held[n]) refuse(particle + " is held by constraints. Fix: leave it out; free particles hit each other");
+    s.balls.members.push_back({n, {}});
+  }
+  for (Bouncer& own : s.bouncers)
+    if (slot[own.node] >= 0) s.balls.members[slot[own.node]].contacts = std::move(own.contacts);
+  std::erase_if(s.bouncers, [&](const Bouncer& own) { return slot[own.node] >= 0; });
 }
 
 // Its coefficient stands behind those of contacts.
@@ -174,14 +203,17 @@ ContactSizes add_contacts(const SceneSpec& spec, Scene& s) {
                           c.dissipates ? static_cast<int>(dissipating++) : -1, points_in_contact(s), weights});
     if (c.arity > 1) weights += c.nodes.size();
   }
-  add_bouncers(s);
+  const std::vector<char> held = held_nodes(s);
+  add_bouncers(held, s);
   add_self_contact(spec, weights, s, carries);
+  const std::size_t radii = s.contacts.size() + spec.self_contact.pieces.size();
+  add_balls(spec.balls, held, radii, bouncing, s);
   return {s.contacts.size() + s.self_contact.rubs(),
-          s.contacts.size() + spec.self_contact.pieces.size(),
+          radii + s.balls.members.size(),
           soft,
           poses,
           sizes,
-          bouncing,
+          bouncing + !s.balls.empty(),
           weights + most_point_nodes * s.self_contact.on_bodies.size(),
           dissipating};
 }

@@ -27,12 +27,12 @@ enum class Quantity : int {
   volume,             // per closed surface: the one that it keeps  [m^3]
   volume_compliance,  // likewise  [m^3/Pa]
   friction,           // per contact: Coulomb's coefficient  [-]
-  contact_radius,  // per contact: of its particles, from their center to where they touch; then of what touches itself  [m]
+  contact_radius,  // per contact: of its particles, from their center to where they touch; then of what touches itself; then per ball  [m]
   contact_stiffness,  // per contact that is not rigid  [N/m]
   collider_pose,      // per collider and knot: position [m] and rotation vector [rad] of its frame (2 x 3)
   collider_size,      // per collider: the lengths of its shape  [m]
-  restitution,        // per contact off which particles bounce: the speed after an impact over that before  [-]
-  load,               // (knots, loads along rows): energy over the unit of C, such as N m where it is an angle
+  restitution,  // per contact off which particles bounce: the speed after an impact over that before; then of balls  [-]
+  load,         // (knots, loads along rows): energy over the unit of C, such as N m where it is an angle
   contact_weight,  // per contact of points that several nodes carry: (points, nodes), of the nodes in their sum; m for axes. Then of what touches itself
   contact_dissipation,  // per contact that dissipates: the share of its push that a speed along the normal adds  [s/m]
 };

@@ -101,6 +101,15 @@ struct Bouncer {
   std::vector<int> contacts;  // off which it does
 };
 
+// Particles with a radius that hit each other. No constraint holds them.
+struct Balls {
+  std::vector<Bouncer> members;
+  std::size_t first_radius = 0;  // in Quantity::contact_radius, one for each
+  int restitution = -1;          // place in Quantity::restitution
+
+  bool empty() const { return members.empty(); }
+};
+
 // A load along a row of a constraint (core/step/apply_loads.h).
 struct Load {
   int group, item, row;
@@ -136,7 +145,8 @@ struct Scene {
   std::vector<Volume> volumes;
   std::vector<Collider> colliders;
   std::vector<Contact> contacts;
-  std::vector<Bouncer> bouncers;  // by node
+  std::vector<Bouncer> bouncers;  // by node; balls stand in `balls` instead
+  Balls balls;
   SelfContact self_contact;
   int constraints = 0, rows = 0;
   std::size_t stencil_coordinates = 0, gradient_entries = 0;
@@ -201,6 +211,7 @@ struct SceneSpec {
   std::vector<ColliderSpec> colliders;
   std::vector<ContactSpec> contacts;
   SelfContactSpec self_contact;
+  std::vector<int> balls = {};  // particles that hit each other
 };
 
 // Rows whose damping needs a reference: all of them, or none.

@@ -16,7 +16,8 @@ namespace sheetbend {
 
 // Whether this is such a solver of such a scene.
 inline bool changes_at_contacts(const Scene& scene, const SolverOptions& o) {
-  return o.integrator == Integrator::bdf2 && (!scene.contacts.empty() || !scene.self_contact.empty());
+  return o.integrator == Integrator::bdf2 &&
+         (!scene.contacts.empty() || !scene.self_contact.empty() || !scene.balls.empty());
 }
 
 // Scenes of a T: the lanes of a pack, otherwise one.

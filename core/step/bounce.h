@@ -1,50 +1,38 @@
-// Particles that no constraint holds bounce off colliders with restitution (core/contact/impact.h). Where the free end of a substep is past a
-// surface that its start was not, the projection begins at the end of the flight that the impact leaves, outside the surface; other contacts act from
-// there. An approach that is too slow to bounce is left to the projection as a contact without restitution.
+// Particles that no constraint holds bounce off colliders with restitution (core/contact/impact.h), and balls hit each other (core/step/ball_flights.h).
+// Where the free end of a substep is past a surface that its start was not, the projection begins at the end of the flight that the impact leaves, outside the
+// surface; other contacts act from there. An approach that is too slow to bounce is left to the projection as a contact without restitution.
 #pragma once
 
-#include "core/contact/impact.h"
+#include "core/step/ball_flights.h"
 #include "core/step/stages.h"
 
 namespace sheetbend {
 
 struct Bounce {
   static constexpr bool repeated = true;
-  static constexpr int most_impacts = 16;  // of a particle in a substep; what comes after them does not bounce
 
   template <class T>
   struct Record {
-    std::vector<Impact<Single<T>>> impacts;  // particle by particle, in the order in which they happened
+    std::vector<Impact<Single<T>>> impacts;  // of each particle in the order in which they happened
 
     void resize(const Scene&, const Plan&, bool) {}
     static std::size_t bytes(const Scene&, const Plan&, bool) { return 0; }
   };
 
   template <class T>
-  static ImpactRule rule(const ContactSource<T>& source, int contact) {
-    return {source.scene.colliders[source.scene.contacts[contact].collider].any(), source.h, source.bdf.before != 0.0};
-  }
-
-  // From the state at n to the free end y.
-  template <class T>
-  static Flight<Single<T>> flight(const ContactSource<T>& source, int node, const Vec3<Single<T>>& y) {
-    using S = Single<T>;
-    Flight<S> f{source.at(source.from.x, node), source.at(source.from.v, node), y, {}, S(source.h)};
-    f.v_end = S((source.bdf.before == 0.0 ? 1.0 : 2.0) / source.h) * (y - f.x);
-    if (source.bdf.before != 0.0) f.v_end = f.v_end - f.v;
-    return f;
-  }
-
-  template <class T>
   static void forward(const Step<T>& step, Work<T>& work, Record<T>& record) {
     const Scene& scene = step.scene;
-    if (scene.bouncers.empty()) return;
+    if (scene.bouncers.empty() && scene.balls.empty()) return;
     std::erase_if(record.impacts, [&](const auto& impact) { return has(step.scenes, impact.lane); });
     for (int lane = 0; lane < scenes_of<T>; ++lane) {
       if (!has(step.scenes, lane)) continue;
       const ContactSource<T> source = contact_source(step, work.masses, lane);
       const auto poses = source.poses();
       for (const Bouncer& bouncer : scene.bouncers) fly(source, poses, bouncer, work, record);
+      if (scene.balls.empty()) continue;
+      BallFlights<T> balls(source, poses, work.q);
+      balls.fly(record.impacts);
+      for (const auto& [node, end] : balls.ends()) source.write(end, work.q.of(node));
     }
     work.impacts = &record.impacts;
   }
@@ -55,27 +43,28 @@ struct Bounce {
                   Work<T>& work, Record<T>& record) {
     using S = Single<T>;
     const int node = bouncer.node;
-    Flight<S> f = flight(source, node, source.read(Vec3<T>(work.q.of(node))));
+    Flight<S> f = flight_of(source, node, source.read(Vec3<T>(work.q.of(node))));
     std::vector<int> left = bouncer.contacts;
     for (int turn = 0; turn < most_impacts; ++turn) {
       const Flight<double> path = as_values(f);
       int first = -1;
       double t = 0.0;
       for (const int contact : left) {
-        const ImpactRule own = rule(source, contact);
+        const ImpactRule own = rule_of(source, contact);
         const auto surface = as_values(source.surface(poses, contact));
         if (!meets(own, path, surface)) continue;
-        const double when = time_of_impact(own, path, surface);
+        const double when = time_of_impact(own, path, surface, 0.0, path.left);
         if (first < 0 || when < t) first = contact, t = when;
       }
       if (first < 0) break;
       const Surface<S> surface = source.surface(poses, first);
-      if (!bounces(rule(source, first), path, as_values(surface), t)) {
+      if (!bounces(rule_of(source, first), path, as_values(surface), t)) {
         std::erase(left, first);
         continue;
       }
-      record.impacts.push_back({source.lane, node, first, t, f, bounced(rule(source, first), f, surface, t)});
-      f = record.impacts.back().after;
+      const Flight<S> after = bounced(rule_of(source, first), f, surface, t);
+      record.impacts.push_back({source.lane, first, {t, true, false}, {Flown<S>{node, -1, f, after}}});
+      f = after;
       source.write(f.x_end, work.q.of(node));
     }
   }
@@ -96,8 +85,10 @@ struct LeaveImpacts {
     for (const Impact<S>& impact : *work.impacts) {
       if (!has(step.scenes, impact.lane)) continue;
       const ContactSource<T> source = contact_source(step, work.masses, impact.lane);
-      const Vec3<S> moved = source.at(work.x_next, impact.node) - impact.after.x_end;
-      source.write(impact.after.v_end + rate * moved, work.v_next + step.scene.first_dof[impact.node]);
+      for (const Flown<S>& f : impact.flown()) {
+        const Vec3<S> moved = source.at(work.x_next, f.node) - f.after.x_end;
+        source.write(f.after.v_end + rate * moved, work.v_next + step.scene.first_dof[f.node]);
+      }
     }
   }
 };

@@ -1,8 +1,11 @@
 // What the stages of a substep read, and what they hand on to each other.
 #pragma once
 
+#include <array>
+#include <span>
 #include <vector>
 
+#include "core/contact/collision.h"
 #include "core/packs/packed_colors.h"
 #include "core/points/point_kernels.h"
 #include "core/scalar/point.h"
@@ -44,13 +47,23 @@ struct InverseMasses {
   }
 };
 
-// A particle that bounced in a substep, in one scene of a T.
+// A flight that an impact ended, and the one that it began.
+template <class S>
+struct Flown {
+  int node = -1;
+  int ball = -1;  // place in Scene::balls, of those that hit each other
+  Flight<S> before, after;
+};
+
+// A particle that bounced in a substep, or two that hit each other, in one scene of a T.
 template <class S>
 struct Impact {
-  int lane, node;
-  int contact;
-  double time;  // since the flight began that it ended
-  Flight<S> before, after;
+  int lane;
+  int contact;          // -1 where two hit each other
+  BallMeeting meeting;  // of one particle the time alone, since its flight began
+  std::array<Flown<S>, 2> both;
+
+  std::span<const Flown<S>> flown() const { return {both.data(), contact < 0 ? std::size_t{2} : 1}; }
 };
 
 // What the stages write for each other.
@@ -61,7 +74,7 @@ struct Work {
   T *x_next, *v_next;        // (dofs); the repetition for a reverse has no v_next
   bool finite = true;        // whether all of x_next is
   T* multipliers = nullptr;  // of the substep, where a later stage reads them
-  const std::vector<Impact<Single<T>>>* impacts = nullptr;  // particle by particle, in order; none where it is null
+  const std::vector<Impact<Single<T>>>* impacts = nullptr;  // of each particle in order; none where it is null
   std::vector<SweptContacts<Single<T>>>* swept = nullptr;   // per scene; none where no contacts go by sweeps
 };
 

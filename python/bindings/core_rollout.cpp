@@ -95,6 +95,7 @@ py::dict simulate(const Solver& s, const Array& inputs, const Steps& steps, doub
   };
   for (const ContactCounts& c : contacts.counts()) counted(c);
   if (s.scene->self_contact.rubs()) counted(contacts.pairs());
+  if (!s.scene->balls.empty()) counted(contacts.balls());
   out["contacts"] = counts;
   out["contact_modes"] = modes;
   return out;

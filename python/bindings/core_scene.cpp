@@ -74,6 +74,7 @@ std::shared_ptr<Scene> make_scene(const py::kwargs& given) {
   if (given.contains("self_carried")) spec.self_contact.carried = whole_numbers(given["self_carried"]);
   if (given.contains("self_on_bodies"))
     spec.self_contact.on_bodies = given["self_on_bodies"].cast<std::vector<std::array<int, 4>>>();
+  if (given.contains("balls")) spec.balls = whole_numbers(given["balls"]);
   if (given.contains("loads")) {
     for (const auto& [group, item, row] : given["loads"].cast<std::vector<std::array<int, 3>>>())
       spec.loads.push_back({group, item, row});
@@ -125,6 +126,8 @@ py::dict arguments_of_scene(const Scene& s) {
   std::map<int, std::pair<std::vector<std::array<int, 2>>, Triangles>> touching;  // by the place of its radius
   for (const auto& edge : s.self_contact.edges) touching[s.self_contact.radius[edge[0]]].first.push_back(edge);
   for (const auto& t : s.self_contact.triangles) touching[s.self_contact.radius[t[0]]].second.push_back(t);
+  std::vector<int> balls;
+  for (const Bouncer& own : s.balls.members) balls.push_back(own.node);
   py::list pieces;
   for (const auto& [place, piece] : touching)
     pieces.append(py::dict("edges"_a = piece.first, "triangles"_a = piece.second));
@@ -135,7 +138,8 @@ py::dict arguments_of_scene(const Scene& s) {
                   "force_times"_a = s.force.times, "has_drag"_a = s.has_drag, "air"_a = s.air,
                   "wind_times"_a = s.wind.times, "groups"_a = groups, "volumes"_a = volumes, "colliders"_a = colliders,
                   "contacts"_a = contacts, "loads"_a = loads, "load_times"_a = s.load.times, "self_contact"_a = pieces,
-                  "self_carried"_a = s.self_contact.carried, "self_on_bodies"_a = s.self_contact.on_bodies);
+                  "self_carried"_a = s.self_contact.carried, "self_on_bodies"_a = s.self_contact.on_bodies,
+                  "balls"_a = py::array_t<int>(py::cast(balls)));
 }
 
 }  // namespace

@@ -208,6 +208,28 @@ TEST_P(Bouncing, ComesToRest) {
   EXPECT_NEAR(end[0], end[-static_cast<long>(s.scene.dofs())], 1e-12);
 }
 
+// Without friction the surface does not know how fast a particle moves along it, also where it does not move at all.
+TEST_P(Bouncing, SlipsWithoutFrictionHoweverLittle) {
+  for (const double height : {0.3, 0.0})
+    for (const double e : {0.8, -1.0}) {
+      ContactBuilder b;
+      b.particle({0.0, 0.0, height}, 0.3);
+      b.collider("plane", {}, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0});
+      b.contact(0.0, 0.0, 0.0, e);
+      for (const Partition partition : {Partition::implicit, Partition::gauss_seidel}) {
+        const Sample s = b.build(g);
+        SolverOptions options = contact_options(1.0 / 480.0, GetParam());
+        options.partition = partition;
+        const Program p{s.scene, make_plan(s.scene, options), 240};
+        std::vector<double> seed(s.scene.dofs());
+        seed[0] = 1.0;
+        const auto bar = gradient_of_end(p, s.inputs, seed);
+        EXPECT_NEAR(bar[s.scene.layout.of(Quantity::velocity)], 0.5, 1e-9) << height << " " << e;
+        EXPECT_NEAR(bar[s.scene.layout.of(Quantity::position)], 1.0, 1e-9) << height << " " << e;
+      }
+    }
+}
+
 TEST(Bounce, IsRefusedOfWhatIsHeldAndSoft) {
   ContactBuilder b;
   b.particle({0.0, 0.0, 0.1}, 0.1), b.particle({0.1, 0.0, 0.1}, 0.1);

@@ -150,6 +150,64 @@ def test_what_cannot_be_is_refused(old: str, new: str, field: str, words: str):
     assert words in str(error.value)
 
 
+MARBLES = """\
+[experiment]
+name = "marbles"
+
+[solver]
+h = 2e-3
+method = "gauss_seidel"
+
+[[scene.particles]]
+name = "shooter"
+mass = 0.02
+positions = [[-0.2, 0.0, 0.0]]
+velocity = [[1.0, 0.0, 0.0]]
+
+[[scene.particles]]
+name = "marble"
+mass = 0.01
+positions = [[0.0, 0.0, 0.0], [0.1, 0.01, 0.0]]
+
+[scene.collisions]
+of = ["shooter", "marble"]
+radius = 0.02
+restitution = 0.9
+"""
+
+
+def test_balls_of_a_configuration_hit_each_other():
+    scene = built(MARBLES)
+    alike = sb.Scene("marbles")
+    alike.add_particles(
+        [[-0.2, 0, 0], [0, 0, 0], [0.1, 0.01, 0]], [0.02, 0.01, 0.01], [[1.0, 0, 0], [0, 0, 0], [0, 0, 0]]
+    )
+    alike.add_collisions([0, 1, 2], radius=0.02, restitution=0.9)
+    solver = sb.Solver(h=2e-3, method="gauss_seidel")
+    found, expected = (sb.simulate(s, [0.0, 0.3], solver) for s in (scene, alike))
+    assert np.array_equal(found.positions, expected.positions)
+    assert found.contacts["balls"].began == 2
+    several = built(MARBLES.replace("radius = 0.02", "radius = [0.02, 0.01]")).quantities
+    assert [several[f"balls_contact_radius_{k}"].value for k in range(3)] == [0.02, 0.01, 0.01]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "field", "words"),
+    [
+        ("radius = 0.02", "radius = 0.0", "scene.collisions", "give positive radii"),
+        ("radius = 0.02", "radius = [0.02]", "scene.collisions", "one for each name"),
+        ("restitution = 0.9", "restitution = 1.1", "scene.collisions.restitution", "at most 1"),
+        ('["shooter", "marble"]', '["shooter", "ball"]', "scene.collisions.of", "use some of: shooter, marble"),
+        ('["shooter", "marble"]', '"shooter"', "scene.collisions.particles", "give two or more"),
+    ],
+)
+def test_collisions_that_cannot_be_are_refused(old: str, new: str, field: str, words: str):
+    with pytest.raises(sb.ConfigError) as error:
+        built(MARBLES.replace(old, new, 1))
+    assert error.value.field == field
+    assert words in str(error.value)
+
+
 def test_a_tool_that_is_corrected_moves_no_collider(tmp_path: Path):
     text = DRAGGED.replace("radius = 0.02", 'radius = 0.02\ntool = "hand"')
     with pytest.raises(sb.ConfigError, match="post_x"):

@@ -133,11 +133,13 @@ def bag() -> sb.Scene:
 
 
 def dropped() -> sb.Scene:
-    """A rope above a ball off which it bounces, and a body above a floor."""
+    """A rope above a ball off which it bounces, a body above a floor, and two marbles that hit each other."""
     scene = sb.rope(0.1, 3, density=0.05, EI=1e-3, points=[[0, 0, 0.1], [0.1, 0, 0.1]], pinned=())
     floor = sb.Plane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), name="floor")
     ball = sb.Sphere((0.0, 0.0, -0.5), 0.5, name="ball")
     scene.add_contact(scene.ropes["rope"], ball, friction=0.3, radius=0.01, restitution=0.5)
+    marbles = scene.add_particles([[0, 1, 0.5], [0.1, 1, 0.5]], 0.01, [[1.0, 0, 0], [-1.0, 0, 0]])
+    scene.add_collisions(marbles, radius=0.01, restitution=0.5, name="marbles")
     body = scene.add_body("block", mass=0.1, inertia=[1e-3, 1e-3, 1.5e-3], at=(1, 0, 0.3))
     scene.add_contact(body, floor, friction=0.3, points=[[0.1, 0, 0], [-0.1, 0, 0]], name="corners")
     return scene

@@ -178,6 +178,12 @@ SCENE: dict[str, Callable[[], Call]] = {
     ),
     "Scene.add_contact": lambda: _touching(radius=0.01, stiffness=1e3, restitution=0.1, name="c"),
     "Scene.add_contact soft": lambda: _touching(stiffness=1e3, dissipation=0.1),
+    "Scene.add_collisions": lambda: _with(
+        _particles(), "add_collisions", what=[0, 1], radius=0.01, restitution=0.5, name="c"
+    ),
+    "Scene.add_collisions of several radii": lambda: _with(
+        _particles(), "add_collisions", what=[0, 1], radius=[0.01, 0.02], restitution=0.5
+    ),
     "Scene.add_contact of a body": lambda: (
         lambda s, b: _with(
             s, "add_contact", what=b, collider=sb.Plane(), friction=0.3, points=sb.box_corners((0.1, 0.1, 0.1))

@@ -138,6 +138,34 @@ class ContactSection(Section):
         return [self.of] if isinstance(self.of, str) else self.of
 
 
+class CollisionsSection(Section):
+    """[scene.collisions]: particles that hit each other like smooth balls, `Scene.add_collisions` (docs/contact.md).
+    Its quantities are balls_restitution and balls_contact_radius (m), or balls_contact_radius_0 and so on where there
+    are several radii."""
+
+    of: Name | list[Name] = key(..., "a set of particles, or several: all of their particles, which nothing holds")
+    radius: Finite | list[Finite] = key(
+        ..., "of the balls: one for all, or one for each set that is named in `of`", "m"
+    )
+    restitution: Finite = key(..., "speed after an impact over that before, along the centers", ge=0, le=1)
+
+    @model_validator(mode="after")
+    def _radii_are_positive(self) -> Self:
+        radii = self.radius if isinstance(self.radius, list) else [self.radius]
+        if not all(r > 0 for r in radii):
+            raise ValueError(f"has a radius of {min(radii)}|give positive radii")
+        if isinstance(self.radius, list) and len(radii) != len(self.sets):
+            raise ValueError(
+                f"has {len(radii)} radii for {len(self.sets)} names|give one for all, or one for each name"
+            )
+        return self
+
+    @property
+    def sets(self) -> list[str]:
+        """Names of the sets."""
+        return [self.of] if isinstance(self.of, str) else self.of
+
+
 class SelfContactSection(Section):
     """[scene.self_contact]: ropes, cloths and bodies that touch themselves and each other, `Scene.add_self_contact`
     (docs/self_contact.md). It needs method = "implicit" in [solver]. The radius is the quantity self_contact_radius

@@ -78,6 +78,27 @@ def add_contacts(
         with located(path, f"{contact.name or contact.collider}.contact"):
             scene.add_contact(what, colliders[contact.collider], name=contact.name, points=points, **numbers)
     _add_self_contact(scene, section)
+    _add_collisions(scene, section, named)
+
+
+def _add_collisions(scene: Scene, section: SceneSection, named: Mapping[str, Sequence[int]]) -> None:
+    given = section.collisions
+    if given is None:
+        return
+    known = [some.name for some in section.particles]
+    unknown = [name for name in given.sets if name not in known]
+    if unknown:
+        fix = f"use some of: {', '.join(known) or 'none, add [[scene.particles]]'}"
+        raise ConfigError("scene.collisions.of", "names no set of particles", unknown, fix)
+    radii = given.radius if isinstance(given.radius, list) else [given.radius] * len(given.sets)
+    sets = [(named[name], r) for name, r in zip(given.sets, radii, strict=True) if name in named]
+    particles = [p for own, _ in sets for p in own]
+    if not particles:
+        return
+    each = [r for own, r in sets for _ in own]
+    with located("scene.collisions", "collisions"):
+        radius = each if isinstance(given.radius, list) else given.radius
+        scene.add_collisions(particles, radius=radius, restitution=given.restitution)
 
 
 def _add_self_contact(scene: Scene, section: SceneSection) -> None:

@@ -60,6 +60,7 @@ HEADERS: dict[str, type[Section]] = {
     "[[scene.collider]]": contact_schema.ColliderSection,
     "[[scene.contact]]": contact_schema.ContactSection,
     "[scene.self_contact]": contact_schema.SelfContactSection,
+    "[scene.collisions]": contact_schema.CollisionsSection,
     "[scene.quantities.NAME]": scene_schema.ExtraQuantity,
     "[[recording]]": schema.RecordingSection,
     "[[recording.force]]": schema.ForceSection,

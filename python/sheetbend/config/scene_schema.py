@@ -8,7 +8,7 @@ from pydantic import model_validator
 
 from .body_schema import BodySection, JointSection
 from .cloth_schema import Cloth, with_fabrics
-from .contact_schema import ColliderSection, ContactSection, SelfContactSection
+from .contact_schema import ColliderSection, CollisionsSection, ContactSection, SelfContactSection
 from .rope_schema import Rod, Rope
 from .section import Finite, Name, Quaternion, Reference, Section, Vector, key
 from .solid_schema import SolidSection
@@ -279,6 +279,9 @@ class SceneSection(Section):
     collider: list[ColliderSection] = key([], "shapes that ropes and cloths touch")
     contact: list[ContactSection] = key([], "who may touch them")
     self_contact: SelfContactSection | None = key(None, "[scene.self_contact]; nothing touches itself when left out")
+    collisions: CollisionsSection | None = key(
+        None, "[scene.collisions]; particles pass through each other when left out"
+    )
     quantities: dict[Name, ExtraQuantity] = key({}, "further named numbers")
 
     @property

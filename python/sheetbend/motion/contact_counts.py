@@ -21,7 +21,8 @@ class ContactMode(IntEnum):
 class ContactCounts:
     """How often the particles of one contact touched, slid and stuck, over all substeps of a simulation.
 
-    For self-contact with friction, pairs of pieces are counted instead of particles.
+    For self-contact with friction, pairs of pieces are counted instead of particles. Of balls that hit each other only
+    `began` and `ended` are counted, once for each impact.
 
     Attributes:
         most: the largest number of particles that touched in one substep.
@@ -33,7 +34,7 @@ class ContactCounts:
         bdf1_share: the share of the scene's substeps that used BDF1. With the integrator "bdf2" these are the first
             substep and three from the start of each contact. BDF1 damps like zeta = omega h/2.
         deepest: m, the largest depth of a particle in the collider at any frame, relative to the contact's radius.
-            Particles that are held or driven have no contact and are left out. None for self-contact.
+            Particles that are held or driven have no contact and are left out. None for self-contact and balls.
     """
 
     most: int

@@ -13,6 +13,7 @@ from .. import _core
 from ..errors import SceneError, choices, refusal
 from ..quantities.quantities import FUNCTIONS, Term, intermediate_of
 from . import pieces
+from .balls import Balls
 from .collider_speeds import Fastest, fastest
 from .domain import Domain
 from .kinks import kinks
@@ -72,7 +73,7 @@ class CompiledScene:
         names: quantity names in the order of theta.
         theta: their values.
         contacts: names of those that particles may have with colliders.
-        touches_itself: whether any rope or cloth may touch itself or another.
+        touches_itself: whether any rope or cloth may touch itself or another, or particles may hit each other.
         kinks: what beside contacts makes its motions not smooth in time, in words; empty if nothing.
         settled: by contact, what started inside a collider and was moved to its surface.
         fastest: the colliders that move and could pass particles unseen.
@@ -99,7 +100,7 @@ class CompiledScene:
         self._base = self._pack(scene)
         self._terms = scene.every_term
         self.contacts = tuple(c.name for c in scene.contacts.contacts)
-        self.touches_itself = bool(scene.contacts.pieces)
+        self.touches_itself = bool(scene.contacts.pieces) or scene.contacts.balls is not None
         self.settled: dict[str, SettledStart] = {}
         self.fastest: tuple[Fastest, ...] = ()
         if self.contacts:
@@ -107,8 +108,10 @@ class CompiledScene:
             self._expect_apart(scene)
             first, _ = self.layout["contact_radius"]
             self.fastest = fastest(scene.contacts, self.inputs()[first : first + len(self.contacts)])
-        if self.touches_itself:
+        if scene.contacts.pieces:
             pieces.expect_apart(self.core, self.inputs(), scene.node_in_words)
+        if scene.contacts.balls is not None:
+            self._expect_balls_apart(scene, scene.contacts.balls)
 
     def _settle(self, scene: SceneData) -> None:
         first, size = self.layout["position"]
@@ -121,6 +124,16 @@ class CompiledScene:
         inputs = self.inputs()
         offset, size = self.layout["mass"]
         scene.contacts.expect_apart(self.core, inputs, inputs[offset : offset + size], scene.gravity, set(scene.held))
+
+    def _expect_balls_apart(self, scene: SceneData, balls: Balls) -> None:
+        inputs = self.inputs()
+        places, radii = (self._part(inputs, array) for array in ("position", "contact_radius"))
+        own = radii[len(radii) - len(balls.particles) :]
+        balls.expect_apart(places.reshape(-1, 3)[balls.particles], own, scene.node_in_words)
+
+    def _part(self, inputs: np.ndarray, array: str) -> np.ndarray:
+        offset, size = self.layout[array]
+        return inputs[offset : offset + size]
 
     @cached_property
     def _map(self) -> _core.ParameterMap:

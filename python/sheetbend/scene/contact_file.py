@@ -8,6 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..errors import SceneError
+from .balls import Balls
 from .colliders import Box, Capsule, Collider, Cylinder, Motion, Plane, Sphere
 from .contacts import ARRAYS, Contact
 from .scene import Scene
@@ -36,7 +37,7 @@ def written_contacts(scene: Scene) -> tuple[dict[str, Any], dict[str, Array]]:
     if contacts.pieces:
         fix = "leave it out, or keep the program that makes the scene"
         raise SceneError("self_contact", "is not held by scene files", [p.name for p in contacts.pieces], fix)
-    if not contacts.contacts:
+    if not contacts.contacts and contacts.balls is None:
         return {}, {}
     colliders = contacts.colliders.items()
     for name, collider in colliders:
@@ -59,7 +60,10 @@ def written_contacts(scene: Scene) -> tuple[dict[str, Any], dict[str, Array]]:
         f"contact_{i}": np.column_stack([scene.places_of(c.nodes), scene.places_of(c.carried)])
         for i, c in enumerate(contacts.contacts)
     }
-    return header, times | rows
+    if contacts.balls is None:
+        return header, times | rows
+    header["collisions"] = {"name": contacts.balls.name}
+    return header, times | rows | {"collisions": scene.places_of(contacts.balls.particles)}
 
 
 def read_contacts(reader: Reader, scene: Scene, take: Callable[..., Array], fix: str) -> None:
@@ -86,7 +90,12 @@ def read_contacts(reader: Reader, scene: Scene, take: Callable[..., Array], fix:
         name = reader.name(about, "name", where)
         contacts.contacts.append(Contact(name, collider, rows[:, :-1], rows[:, -1], rigid, bounces, dissipates))
     count, soft = len(contacts.contacts), sum(not c.rigid for c in contacts.contacts)
-    made = [take("friction", count), take("contact_radius", count), take("contact_stiffness", soft)]
+    balls = 0
+    if "collisions" in reader.header:
+        name = reader.name(reader.part(reader.header, "collisions", dict), "name", "collisions.")
+        contacts.balls = Balls(name, reader.nodes("collisions", (None,)))
+        balls = len(contacts.balls.particles)
+    made = [take("friction", count), take("contact_radius", count + balls), take("contact_stiffness", soft)]
     colliders = reader.records("colliders")
     for i, about in enumerate(colliders):
         where = f"colliders[{i}]."
@@ -104,7 +113,7 @@ def read_contacts(reader: Reader, scene: Scene, take: Callable[..., Array], fix:
         contacts.colliders[name] = _MAKE[shape][1](*lengths, name=name, motion=motion)
     made += [
         take("collider_size", sum(len(c.sizes) for c in contacts.colliders.values())),
-        take("restitution", sum(c.bounces for c in contacts.contacts)),
+        take("restitution", sum(c.bounces for c in contacts.contacts) + (balls > 0)),
         take("contact_weight", sum(c.nodes.size for c in contacts.contacts if c.of_body)),
         take("contact_dissipation", sum(c.dissipates for c in contacts.contacts)),
     ]

@@ -13,9 +13,10 @@ from ..arrays.checks import check_label, is_number, node_array
 from ..errors import SceneError
 from ..quantities.expression import terms_of
 from ..quantities.quantities import ZERO_OR_MORE, Builder, Term
+from .balls import Balls
 from .body_points import BodyPoints
 from .colliders import Collider
-from .pieces import PairFriction, Piece
+from .pieces import PairFriction, Piece, piece_terms
 
 Array = np.ndarray
 ARRAYS = (
@@ -120,6 +121,7 @@ class Contacts:
         self.settling: set[str] = set()  # those that move what starts inside to the surface
         self.pieces: list[Piece] = []  # what may touch itself
         self.pair_friction: PairFriction | None = None  # of these
+        self.balls: Balls | None = None  # that hit each other
 
     @property
     def weights(self) -> int:
@@ -127,9 +129,27 @@ class Contacts:
         return sum(c.nodes.size for c in self.contacts if c.of_body)
 
     def counted(self) -> dict[str, int]:
-        """By name of a contact, how many particles may touch; for pairs with friction, how many pairs."""
+        """By name of a contact, how many particles may touch; for pairs with friction, how many pairs; of balls all."""
         sizes = {c.name: len(c.particles) for c in self.contacts}
-        return sizes if self.pair_friction is None else {**sizes, self.pair_friction.name: self.pair_friction.room}
+        if self.pair_friction is not None:
+            sizes[self.pair_friction.name] = self.pair_friction.room
+        if self.balls is not None:
+            sizes[self.balls.name] = len(self.balls.particles)
+        return sizes
+
+    def between_pieces(self) -> list[Term]:
+        """What makes the inputs of pieces and of balls, which stand behind those of contacts with colliders."""
+        first = len(self.contacts)
+        terms = piece_terms(self.pieces, self.pair_friction, first, self.weights)
+        if self.balls is not None:
+            terms += self.balls.terms(first + len(self.pieces), sum(c.bounces for c in self.contacts))
+        return terms
+
+    def check_name(self, field: str, name: str) -> None:
+        """Raises SceneError where a contact or collisions have the name."""
+        check_label(field, name)
+        if any(c.name == name for c in self.contacts) or (self.balls is not None and self.balls.name == name):
+            raise SceneError(field, "is taken by another contact", name, "give each contact a name of its own")
 
     def _place(self, scene: Builder, collider: Collider) -> int:
         """The place of a collider, which is added unless it is there."""
@@ -169,9 +189,7 @@ class Contacts:
                 "give a Plane, Sphere, Capsule, Cylinder, Box or DistanceField",
             )
         name = collider.name or collider.shape if name is None else name
-        check_label("contact.name", name)
-        if any(c.name == name for c in self.contacts):
-            raise SceneError("contact.name", "is taken by another contact", name, "give each contact a name of its own")
+        self.check_name("contact.name", name)
         if isinstance(what, BodyPoints):
             which = np.tile(what.body.particles, (len(what.places), 1))
         else:
@@ -249,6 +267,7 @@ class Contacts:
                 }
                 for c in self.contacts
             ],
+            "balls": places_of(np.zeros(0, dtype=int) if self.balls is None else self.balls.particles),
         }
 
     def arrays(self) -> Mapping[str, Array]:
@@ -256,13 +275,14 @@ class Contacts:
         poses = [
             np.concatenate([c.poses.positions, c.poses.rotations], axis=1).ravel() for c in self.colliders.values()
         ]
+        balls = 0 if self.balls is None else len(self.balls.particles)
         return {
             "friction": np.zeros(len(self.contacts) + (self.pair_friction is not None)),
-            "contact_radius": np.zeros(len(self.contacts) + len(self.pieces)),
+            "contact_radius": np.zeros(len(self.contacts) + len(self.pieces) + balls),
             "contact_stiffness": np.zeros(sum(not c.rigid for c in self.contacts)),
             "collider_pose": np.concatenate([np.zeros(0), *poses]),
             "collider_size": np.zeros(sum(len(c.sizes) for c in self.colliders.values())),
-            "restitution": np.zeros(sum(c.bounces for c in self.contacts)),
+            "restitution": np.zeros(sum(c.bounces for c in self.contacts) + (balls > 0)),
             "contact_weight": np.zeros(self.weights + 4 * sum(p.points for p in self.pieces)),
             "contact_dissipation": np.zeros(sum(c.dissipates for c in self.contacts)),
         }

@@ -182,7 +182,9 @@ class Domain:
             return f"'{list(self._scene.volumes.triangles)[i]}'"
         if array in ("friction", "contact_radius"):
             contacts = self._scene.contacts
-            return f"'{[*(c.name for c in contacts.contacts), *(p.name for p in contacts.pieces)][i]}'"
+            names = [*(c.name for c in contacts.contacts), *(p.name for p in contacts.pieces)]
+            balls = [] if contacts.balls is None else contacts.balls.particles.tolist()
+            return f"'{names[i]}'" if i < len(names) else self._scene.node_in_words(balls[i - len(names)])
         if array not in ("compliance", "damping", "rest"):
             return f"entry {i}"
         for g in self._scene.groups:

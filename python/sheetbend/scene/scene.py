@@ -31,17 +31,17 @@ from .body import Body, BodyPoint
 from .body_force import push_body
 from .body_points import points_of
 from .colliders import Collider
+from .collisions import CollidingScene
 from .compiled import CompiledScene
 from .contacts import ContactNumbers, HasParticles
 from .group import make_group
 from .inertia import Inertia
 from .scene_checks import validate
-from .self_contact import SelfTouchingScene
 
 Array = np.ndarray
 
 
-class Scene(SelfTouchingScene):
+class Scene(CollidingScene):
     """A scene under construction; `freeze()` (done by the first simulation) ends the construction.
 
     Every number enters either as a plain value or as a named quantity (`<group>_<quantity>`), by which gradients, fits

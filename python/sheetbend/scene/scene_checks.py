@@ -29,7 +29,9 @@ def validate(scene: SceneData) -> None:
         names = ", ".join(scene.node_in_words(place) for place in light[:5])
         raise SceneError("mass", "is zero for free particles", names, "give them a mass, or pin them")
     if scene.groups:
-        touching = (c.particles for c in scene.contacts.contacts)
+        touching = [c.particles for c in scene.contacts.contacts]
+        if scene.contacts.balls is not None:
+            touching.append(scene.contacts.balls.particles)
         used = np.zeros(scene.node_count, dtype=bool)
         for particles in (*(g.particles for g in scene.groups), *scene.volumes.triangles.values(), *touching):
             used[particles] = True

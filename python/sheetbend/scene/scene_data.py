@@ -20,7 +20,6 @@ from .contacts import Contacts
 from .forces import Forces
 from .frames import Frame
 from .group import Group
-from .pieces import piece_terms
 from .volume import Volumes
 
 Array = np.ndarray
@@ -127,8 +126,7 @@ class SceneData:
         """Those that were added, of the boundary, and of the start of bodies, those first on which others hang."""
         x, v = self.nodes, self._of_nodes("velocities")
         starts = (t for body in sorted(self.bodies.values(), key=self._depth) for t in body.start_terms(x, v))
-        contacts = self.contacts
-        between = piece_terms(contacts.pieces, contacts.pair_friction, len(contacts.contacts), contacts.weights)
+        between = self.contacts.between_pieces()
         return [*self.terms, *self.boundary.terms(), *self.forces.terms(), *starts, *between]
 
     def _depth(self, body: Body) -> int:

@@ -101,6 +101,7 @@ def _header(scene: Scene) -> dict[str, Any]:
     named |= written_contacts(scene)[0]
     parts = ("groups", "volumes", "quantities", "colliders", "contacts")
     every = [scene.name, *(n["name"] for part in parts for n in named.get(part, ()))]
+    every += [named["collisions"]["name"]] if "collisions" in named else []
     for text in (*every, *(q.unit for q in scene.quantities.values()), *_markers(scene)):
         if not is_name(text):
             raise SceneError("name", "cannot be written to a file", text, f"use up to {LONGEST_NAME} printable letters")

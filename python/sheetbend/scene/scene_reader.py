@@ -339,7 +339,7 @@ class SceneReader:
 
 def file_layout(scene: Scene) -> dict[str, list[int]]:
     """The layout of the input arrays in a file: without the arrays of contacts where there are none."""
-    touches = bool(scene.contacts.contacts)
+    touches = bool(scene.contacts.contacts) or scene.contacts.balls is not None
     left_out = {"contact_weight"} if touches else set(CONTACT_ARRAYS)  # the first of those that files did not have
     own = scene.compiled.layout.items()
     return {name: list(place) for name, place in own if place[1] or name not in left_out}

@@ -106,6 +106,12 @@ struct ContactBuilder {
       if (e >= 0.0) restitution.push_back(e);
     }
   }
+  // Particles with these radii that hit each other; after all contacts.
+  void balls(const std::vector<int>& nodes, const std::vector<double>& radii, double e) {
+    spec.balls = nodes;
+    radius.insert(radius.end(), radii.begin(), radii.end());
+    restitution.push_back(e);
+  }
   testing::Sample build(double gravity) {
     spec.particles = static_cast<int>(mass.size());
     testing::Sample s{build_scene(spec), {}};

@@ -1,0 +1,183 @@
+// The flights of a scene's balls in a substep. Their impacts, with each other and with colliders, happen in the order of time: after each, those that it
+// changes are looked for anew. At the same instant the order is that of balls. What is found and in which order are values, of which nothing is differentiated.
+#pragma once
+
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "core/contact/box_grid.h"
+#include "core/step/flights.h"
+
+namespace sheetbend {
+
+template <class T>
+class BallFlights {
+ public:
+  using S = Single<T>;
+
+  BallFlights(const ContactSource<T>& source, const ColliderPoses<S>& poses, const Coordinates<T>& q)
+      : source_(source), poses_(poses), balls_(source.scene.balls) {
+    for (const Bouncer& own : balls_.members) {
+      const int ball = static_cast<int>(flying_.size());
+      const Flight<S> f = flight_of(source, own.node, source.read(Vec3<T>(q.of(own.node))));
+      flying_.push_back({ball_of(source, ball, f), {}, own.contacts, 0});
+      take_values(flying_.back());
+    }
+    for (const int contact : contacts_of_balls())
+      surfaces_.emplace_back(contact, as_values(source.surface(poses, contact)));
+  }
+
+  // Lets them fly to the end of the substep, and adds their impacts.
+  void fly(std::vector<Impact<S>>& impacts) {
+    for (int i = 0; i < count(); ++i) look_for_surfaces(i);
+    for (const auto& [i, j] : near_each_other()) look_for_meeting(i, j);
+    while (!next_.empty()) {
+      const auto first = std::min_element(next_.begin(), next_.end());
+      const Event event = *first;
+      next_.erase(first);
+      if (event.other < 0 && event.rests) {
+        std::erase(flying_[event.one].contacts, event.contact);  // left to the projection
+        look_for_surfaces(event.one);
+        continue;
+      }
+      impacts.push_back(event.other < 0 ? bounce(event) : hit(event));
+      std::erase_if(resting_, [&](const auto& pair) { return event.has(pair.first) || event.has(pair.second); });
+      if (event.rests) resting_.emplace_back(event.one, event.other);
+      std::erase_if(next_, [&](const Event& e) { return e.has(event.one) || e.has(event.other); });
+      look_from(event.one, -1);
+      if (event.other >= 0) look_from(event.other, event.one);
+    }
+  }
+
+  // The nodes that have bounced, and where they fly to.
+  std::vector<std::pair<int, Vec3<S>>> ends() const {
+    std::vector<std::pair<int, Vec3<S>>> all;
+    for (int i = 0; i < count(); ++i)
+      if (flying_[i].impacts > 0) all.emplace_back(balls_.members[i].node, flying_[i].ball.flight.x_end);
+    return all;
+  }
+
+ private:
+  struct Flying {
+    Ball<S> ball;
+    Ball<double> values;
+    std::vector<int> contacts;  // off which it may bounce
+    int impacts;
+  };
+
+  struct Event {
+    double when;  // since the start of the substep
+    int one, other;
+    int contact;  // -1 where two balls meet, as `other` is where one bounces
+    double time;
+    bool dated, rests;
+
+    bool has(int ball) const { return ball >= 0 && (one == ball || other == ball); }
+    bool operator<(const Event& e) const {
+      return std::tie(when, one, other, contact) < std::tie(e.when, e.one, e.other, e.contact);
+    }
+  };
+
+  int count() const { return static_cast<int>(flying_.size()); }
+
+  static void take_values(Flying& f) {
+    f.values = {as_values(f.ball.flight), value_of(f.ball.radius), value_of(f.ball.mass)};
+  }
+
+  void look_from(int i, int but) {
+    look_for_surfaces(i);
+    for (int j = 0; j < count(); ++j)
+      if (j != i && j != but) look_for_meeting(std::min(i, j), std::max(i, j));
+  }
+
+  // With which collider a ball meets next.
+  void look_for_surfaces(int i) {
+    const Flying& f = flying_[i];
+    if (f.impacts >= most_impacts) return;
+    const Flight<double>& path = f.values.flight;
+    Event event{0.0, i, -1, -1, 0.0, true, false};
+    for (const int contact : f.contacts) {
+      const ImpactRule own = rule_of(source_, contact);
+      const Surface<double>& surface = surface_of(contact);
+      if (!meets(own, path, surface)) continue;
+      const double time = time_of_impact(own, path, surface, 0.0, path.left);
+      if (event.contact < 0 || time < event.time) event.contact = contact, event.time = time;
+    }
+    if (event.contact < 0) return;
+    event.when = source_.h - path.left + event.time;
+    event.rests = !bounces(rule_of(source_, event.contact), path, surface_of(event.contact), event.time);
+    next_.push_back(event);
+  }
+
+  void look_for_meeting(int i, int j) {
+    const Flying &one = flying_[i], &other = flying_[j];
+    if (one.impacts >= most_impacts || other.impacts >= most_impacts) return;
+    if (std::find(resting_.begin(), resting_.end(), std::pair(i, j)) != resting_.end()) return;
+    const double e = value_of(source_.read(source_.in.of(Quantity::restitution)[balls_.restitution]));
+    const auto found = meeting_of(rule_of_balls(source_), {one.values, other.values, e});
+    if (!found) return;
+    const double from = source_.h - std::min(one.values.flight.left, other.values.flight.left);
+    next_.push_back({from + found->time, i, j, -1, found->time, found->dated, found->rests});
+  }
+
+  Impact<S> bounce(const Event& event) {
+    Flying& f = flying_[event.one];
+    const Flight<S> before = f.ball.flight;
+    f.ball.flight =
+        bounced(rule_of(source_, event.contact), before, source_.surface(poses_, event.contact), event.time);
+    return {source_.lane, event.contact, {event.time, true, false}, {flown(event.one, before)}};
+  }
+
+  Impact<S> hit(const Event& event) {
+    Flying &one = flying_[event.one], &other = flying_[event.other];
+    const BallMeeting meeting{event.time, event.dated, event.rests};
+    const BallPair<S> before = pair_of(source_, one.ball, other.ball);
+    const auto after = collided(rule_of_balls(source_), before, meeting);
+    one.ball.flight = after[0], other.ball.flight = after[1];
+    return {source_.lane, -1, meeting, {flown(event.one, before.one.flight), flown(event.other, before.other.flight)}};
+  }
+
+  Flown<S> flown(int i, const Flight<S>& before) {
+    Flying& f = flying_[i];
+    ++f.impacts;
+    take_values(f);
+    return {balls_.members[i].node, i, before, f.ball.flight};
+  }
+
+  // Pairs whose ways may cross.
+  std::vector<std::pair<int, int>> near_each_other() const {
+    std::vector<Box> boxes;
+    for (const Flying& f : flying_) {
+      const Flight<double>& path = f.values.flight;
+      const double reach = f.values.radius + 0.125 * path.left * norm(path.v_end - path.v);
+      const double a[3] = {path.x.x, path.x.y, path.x.z}, b[3] = {path.x_end.x, path.x_end.y, path.x_end.z};
+      Box box;
+      for (int d = 0; d < 3; ++d) box.low[d] = std::min(a[d], b[d]) - reach, box.high[d] = std::max(a[d], b[d]) + reach;
+      if (!std::isfinite(dot(path.x, path.x_end))) return {};  // the substep diverges
+      boxes.push_back(box);
+    }
+    return overlaps(boxes, boxes, true);
+  }
+
+  std::vector<int> contacts_of_balls() const {
+    std::vector<int> all;
+    for (const Bouncer& own : balls_.members) all.insert(all.end(), own.contacts.begin(), own.contacts.end());
+    std::sort(all.begin(), all.end());
+    all.erase(std::unique(all.begin(), all.end()), all.end());
+    return all;
+  }
+  const Surface<double>& surface_of(int contact) const {
+    return std::find_if(surfaces_.begin(), surfaces_.end(), [&](const auto& s) { return s.first == contact; })->second;
+  }
+
+  const ContactSource<T>& source_;
+  const ColliderPoses<S>& poses_;
+  const Balls& balls_;
+  std::vector<Flying> flying_;
+  std::vector<std::pair<int, Surface<double>>> surfaces_;
+  std::vector<std::pair<int, int>> resting_;  // whose last impact was with each other, too slow to bounce
+  std::vector<Event> next_;
+};
+
+}  // namespace sheetbend

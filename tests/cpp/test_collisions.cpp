@@ -1,0 +1,257 @@
+// Balls that hit each other: closed forms, what is conserved, the order of impacts in a substep, and gradients.
+#include "core/rollout/rollout.h"
+#include "tests/cpp/support/contact_scenes.h"
+#include "tests/cpp/support/lanes.h"
+
+namespace sheetbend::testing {
+namespace {
+
+constexpr double g = 9.81;
+
+Program program_of_balls(const Sample& s, double h, double time, Integrator integrator) {
+  return {s.scene, make_plan(s.scene, contact_options(h, integrator)), static_cast<int>(std::lround(time / h))};
+}
+
+class Colliding : public ::testing::TestWithParam<Integrator> {};
+INSTANTIATE_TEST_SUITE_P(Collisions, Colliding, ::testing::Values(Integrator::bdf1, Integrator::bdf2));
+
+// Two equal balls hit head on without loss: x2 = v0 T + x1 + 2 r.
+TEST_P(Colliding, HandTheirSpeedOn) {
+  ContactBuilder b;
+  b.particle({0.0, 0.0, 0.0}, 0.3, {1.0, 0.0, 0.0}), b.particle({0.52, 0.0, 0.0}, 0.3);
+  b.balls({0, 1}, {0.1, 0.1}, 1.0);
+  const Sample s = b.build(0.0);
+  const Program p = program_of_balls(s, 1.0 / 480.0, 1.0, GetParam());
+  const auto all = states(p, s.inputs);
+  EXPECT_NEAR(all[p.steps * s.scene.dofs() + 3], 1.2, 1e-12);
+  EXPECT_NEAR(all[p.steps * s.scene.dofs()], 0.32, 1e-12);
+  const auto bar = gradient_of_end(p, s.inputs, {0.0, 0.0, 0.0, 1.0, 0.0, 0.0});
+  const auto of = [&](Quantity q, int i) { return bar[s.scene.layout.of(q) + i]; };
+  EXPECT_NEAR(of(Quantity::position, 0), 1.0, 1e-12);
+  EXPECT_NEAR(of(Quantity::position, 3), 0.0, 1e-12);
+  EXPECT_NEAR(of(Quantity::velocity, 0), 1.0, 1e-12);
+  EXPECT_NEAR(of(Quantity::velocity, 3), 0.0, 1e-12);
+  for (int ball : {0, 1}) EXPECT_NEAR(of(Quantity::contact_radius, ball), 1.0, 1e-12);
+  // m1, m2: v2 = 2 m1/(m1 + m2) from the impact at 0.32 s on.
+  EXPECT_NEAR(of(Quantity::mass, 0), 0.68 / (2.0 * 0.3), 1e-12);
+  EXPECT_NEAR(of(Quantity::mass, 1), -0.68 / (2.0 * 0.3), 1e-12);
+  EXPECT_NEAR(of(Quantity::restitution, 0), 0.68 / 2.0, 1e-12);
+}
+
+// As fast as several of their widths in a substep, they still meet.
+TEST_P(Colliding, DoNotPassThroughEachOther) {
+  ContactBuilder b;
+  b.particle({0.0, 0.0, 0.0}, 1.0, {100.0, 0.0, 0.0}), b.particle({0.5, 0.0, 0.0}, 1.0);
+  b.balls({0, 1}, {0.01, 0.01}, 1.0);
+  const Sample s = b.build(0.0);
+  const Program p = program_of_balls(s, 0.01, 0.02, GetParam());
+  const auto all = states(p, s.inputs);
+  EXPECT_NEAR(all[p.steps * s.scene.dofs()], 0.48, 1e-12);
+  EXPECT_NEAR(all[p.steps * s.scene.dofs() + 3], 2.02, 1e-12);
+}
+
+// A gas of unlike balls.
+Sample gas_of_balls(double e, int count = 14) {
+  ContactBuilder b;
+  Random random(3);
+  std::vector<int> nodes;
+  std::vector<double> radii;
+  for (int i = 0; i < count; ++i) {
+    const double along = 0.2 * (i % 4), across = 0.2 * (i / 4 % 2), up = 0.2 * (i / 8);
+    const Vec3<double> inward = -4.0 * Vec3<double>(along - 0.3, across - 0.1, up - 0.1);
+    nodes.push_back(b.particle({along, across, up}, random(0.1, 1.0),
+                               inward + Vec3<double>(random(-1.0, 1.0), random(-1.0, 1.0), random(-1.0, 1.0))));
+    radii.push_back(random(0.03, 0.09));
+  }
+  b.balls(nodes, radii, e);
+  return b.build(0.0);
+}
+
+TEST_P(Colliding, KeepMomentumAndEnergy) {
+  for (const double e : {1.0, 0.4, 0.0}) {
+    const Sample s = gas_of_balls(e);
+    const Program p = program_of_balls(s, 2e-3, 0.4, GetParam());
+    const Inputs<const double> in{s.scene.layout, s.inputs.data()};
+    const auto sums = [&](const double* v) {
+      std::array<double, 4> sum{};
+      for (int n = 0; n < s.scene.nodes(); ++n)
+        for (int d = 0; d < 3; ++d) {
+          sum[d] += in.of(Quantity::mass)[n] * v[3 * n + d];
+          sum[3] += 0.5 * in.of(Quantity::mass)[n] * v[3 * n + d] * v[3 * n + d];
+        }
+      return sum;
+    };
+    Rollout<double> rollout(s.scene, p.plan, s.inputs.data());
+    const auto before = sums(rollout.state().v);
+    std::size_t impacts = 0;
+    double overlap = 0.0;
+    for (int n = 0; n < p.steps; ++n) {
+      rollout.advance();
+      impacts += rollout.impacts().size();
+      for (int i = 0; i < s.scene.nodes(); ++i)
+        for (int j = 0; j < i; ++j)
+          overlap = std::max(overlap, in.of(Quantity::contact_radius)[i] + in.of(Quantity::contact_radius)[j] -
+                                          norm(Vec3<double>(rollout.x() + 3 * i) - Vec3<double>(rollout.x() + 3 * j)));
+    }
+    EXPECT_GE(impacts, 10u);
+    EXPECT_LE(overlap, 1e-12);
+    const auto after = sums(rollout.state().v);
+    for (int d = 0; d < 3; ++d) EXPECT_NEAR(after[d], before[d], 1e-12);
+    EXPECT_NEAR(after[3], before[3], e == 1.0 ? 1e-12 * before[3] : before[3]);
+    EXPECT_EQ(after[3] < 0.99 * before[3], e < 1.0);
+  }
+}
+
+// Five balls that touch, hit by a sixth: the impact goes through all of them in one substep, one after the other, and the last one leaves.
+TEST_P(Colliding, PassAnImpactOnInOrder) {
+  ContactBuilder b;
+  b.particle({-0.1505, 0.0, 0.0}, 1.0, {1.0, 0.0, 0.0});
+  for (const int place : {3, 0, 4, 1, 2})
+    b.particle({0.1 * place, 0.0, 0.0}, 1.0);  // their numbers are not their order
+  b.balls({0, 1, 2, 3, 4, 5}, std::vector<double>(6, 0.05), 1.0);
+  const Sample s = b.build(0.0);
+  const Program p = program_of_balls(s, 0.1, 1.0, GetParam());
+  Rollout<double> rollout(s.scene, p.plan, s.inputs.data());
+  std::vector<int> order;
+  for (int n = 0; n < p.steps; ++n) {
+    rollout.advance();
+    EXPECT_EQ(rollout.impacts().size(), n == 0 ? 5u : 0u);
+    for (const auto& impact : rollout.impacts()) order.push_back(impact.flown()[0].node * 10 + impact.flown()[1].node);
+  }
+  EXPECT_EQ(order, (std::vector<int>{2, 24, 45, 15, 13}));
+  for (int n = 0; n < 6; ++n) EXPECT_NEAR(rollout.state().v[3 * n], n == 3 ? 1.0 : 0.0, 1e-12) << n;
+  EXPECT_NEAR(rollout.x()[3 * 3], 0.4 + 0.9495, 1e-12);
+}
+
+// Three balls on a floor, one on the other: they stay, as deep in each other as one falls in a few substeps.
+TEST_P(Colliding, RestOnEachOther) {
+  for (const double e : {0.0, 0.3, 0.8}) {
+    ContactBuilder b;
+    for (const double height : {0.1, 0.3, 0.5}) b.particle({0.0, 0.0, height}, 0.3);
+    b.collider("plane", {}, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0});
+    b.contact(0.3, 0.1);
+    b.balls({0, 1, 2}, {0.1, 0.1, 0.1}, e);
+    constexpr double h = 2e-3;
+    const Sample s = b.build(g);
+    const Program p = program_of_balls(s, h, 2.0, GetParam());
+    const auto all = states(p, s.inputs);
+    double deepest = 0.0;
+    for (int n = 0; n <= p.steps; ++n)
+      for (int ball = 0; ball < 3; ++ball)
+        deepest = std::max(deepest, 0.1 + 0.2 * ball - all[n * s.scene.dofs() + 3 * ball + 2]);
+    EXPECT_LE(deepest, 12.0 * g * h * h) << e;
+  }
+}
+
+// Four balls, three of which hit each other while they bounce off shapes, in few substeps and in many.
+Sample juggled_balls() {
+  ContactBuilder b;
+  b.particle({0.0, 0.0, 0.05}, 0.3, {0.5, 0.2, -1.5});
+  b.particle({0.04, 0.01, 0.08}, 0.2, {-0.6, -0.3, -2.0});
+  b.particle({0.02, 0.03, 0.04}, 0.1, {-2.5, -0.4, -3.0});
+  b.particle({-0.02, -0.02, 0.09}, 0.15, {1.5, 1.4, -1.0});
+  b.collider("plane", {}, {0.0, 0.0, 0.0, 0.05, -0.1, 0.3});
+  b.collider("rounded_box", {0.02, 0.08, 0.08, 0.01},
+             {-0.07, 0.0, 0.03, 0.0, 0.1, 0.2, -0.06, 0.0, 0.04, 0.3, 0.2, 0.4}, {0.0, 0.08});
+  b.contact(0.2, 0.003, 0.0, 0.7);
+  b.balls({2, 0, 3, 1}, {0.011, 0.013, 0.012, 0.014}, 0.8);
+  return b.build(g);
+}
+
+struct BallJuggle {
+  Integrator integrator;
+  double h;
+};
+class JugglingBalls : public ::testing::TestWithParam<BallJuggle> {};
+INSTANTIATE_TEST_SUITE_P(Collisions, JugglingBalls,
+                         ::testing::Values(BallJuggle{Integrator::bdf1, 1e-3}, BallJuggle{Integrator::bdf2, 1e-3},
+                                           BallJuggle{Integrator::bdf1, 8e-3}, BallJuggle{Integrator::bdf2, 8e-3}));
+
+TEST_P(JugglingBalls, HaveTheGradientOfComplexSteps) {
+  const Sample s = juggled_balls();
+  const Program p = program_of_balls(s, GetParam().h, 0.08, GetParam().integrator);
+  Rollout<double> rollout(s.scene, p.plan, s.inputs.data());
+  int together = 0, alone = 0;
+  for (int n = 0; n < p.steps; ++n) {
+    rollout.advance();
+    for (const auto& impact : rollout.impacts()) ++(impact.contact < 0 ? together : alone);
+  }
+  EXPECT_GE(together, 2);
+  EXPECT_GE(alone, 3);
+  const auto found = gradient(p, s.inputs);
+  double largest = 0.0;
+  for (const double a : found) largest = std::max(largest, std::abs(a));
+  for (const Quantity q :
+       {Quantity::position, Quantity::velocity, Quantity::mass, Quantity::gravity, Quantity::friction,
+        Quantity::restitution, Quantity::contact_radius, Quantity::collider_pose, Quantity::collider_size}) {
+    const bool of_particles = q == Quantity::position || q == Quantity::velocity;
+    for (std::size_t i = 0; i < (of_particles ? 12 : q == Quantity::mass ? 4 : s.scene.layout.count(q)); ++i) {
+      const std::size_t at = s.scene.layout.of(q) + i;
+      std::vector<Complex> probe(s.inputs.begin(), s.inputs.end());
+      probe[at].im = complex_step;
+      const double expected = loss(p, probe).im / complex_step;
+      EXPECT_NEAR(found[at], expected, 1e-11 * largest + 1e-9 * std::abs(expected))
+          << quantity_names[static_cast<int>(q)] << " " << i;
+    }
+  }
+}
+
+TEST_P(JugglingBalls, HaveTheTangentsOfComplexSteps) {
+  const Sample s = juggled_balls();
+  const Program p = program_of_balls(s, GetParam().h, 0.08, GetParam().integrator);
+  const Layout& l = s.scene.layout;
+  expect_tangents_agree(p, s.inputs,
+                        {l.of(Quantity::contact_radius) + l.count(Quantity::contact_radius) - 1,
+                         l.of(Quantity::restitution) + l.count(Quantity::restitution) - 1, l.of(Quantity::mass) + 1,
+                         l.of(Quantity::velocity) + 4},
+                        1e-9);
+}
+
+TEST_P(JugglingBalls, HaveTheSameBitsWhateverKeepsTheirStates) {
+  const Sample s = juggled_balls();
+  const Program p = program_of_balls(s, GetParam().h, 0.08, GetParam().integrator);
+  expect_bits_of_any_tape(p, s.inputs);
+  InputsOfLanes inputs(Pack::lanes, s.inputs);
+  inputs[3][s.scene.layout.of(Quantity::velocity) + 2] = -0.9;
+  expect_bits_of_lanes(p, inputs, {3, 5}, Schedule::least(p.steps, Tape<double>::window(p.plan)));
+}
+
+TEST(Collisions, AreTheSameHoweverBallsAreNumbered) {
+  const auto ends = [](bool turned) {
+    ContactBuilder b;
+    const Vec3<double> x[3] = {{0.0, 0.0, 0.0}, {0.3, 0.02, 0.0}, {0.55, 0.0, 0.03}};
+    const Vec3<double> v[3] = {{2.0, 0.0, 0.0}, {0.0, 0.1, 0.0}, {-1.0, 0.0, 0.2}};
+    for (int i = 0; i < 3; ++i) {
+      const int k = turned ? 2 - i : i;
+      b.particle(x[k], 0.1 + 0.1 * k, v[k]);
+    }
+    b.balls({0, 1, 2}, std::vector<double>(3, 0.05), 0.9);
+    const Sample s = b.build(g);
+    const Program p = program_of_balls(s, 5e-3, 0.5, Integrator::bdf2);
+    const auto all = states(p, s.inputs);
+    std::vector<double> found;
+    for (int i = 0; i < 3; ++i)
+      for (int d = 0; d < 3; ++d) found.push_back(all[p.steps * s.scene.dofs() + 3 * (turned ? 2 - i : i) + d]);
+    return found;
+  };
+  EXPECT_LE(relative_error(ends(true), ends(false)), 1e-12);
+}
+
+TEST(Collisions, AreRefusedOfWhatIsHeld) {
+  const auto make = [](const std::function<void(ContactBuilder&)>& change) {
+    ContactBuilder b;
+    b.particle({0.0, 0.0, 0.1}, 0.1), b.particle({0.1, 0.0, 0.1}, 0.1), b.particle({0.2, 0.0, 0.1}, 0.1);
+    b.balls({0, 1}, {0.01, 0.01}, 0.5);
+    change(b);
+    return b.build(g);
+  };
+  EXPECT_NO_THROW(make([](ContactBuilder&) {}));
+  EXPECT_THROW(make([](ContactBuilder& b) { b.constraint("distance", {1, 2}, 1e-3, {0.1}); }), std::invalid_argument);
+  EXPECT_THROW(make([](ContactBuilder& b) { b.spec.pinned = {1}; }), std::invalid_argument);
+  EXPECT_THROW(make([](ContactBuilder& b) { b.spec.balls = {0, 0}; }), std::invalid_argument);
+  EXPECT_THROW(make([](ContactBuilder& b) { b.spec.balls = {0}; }), std::invalid_argument);
+  EXPECT_THROW(make([](ContactBuilder& b) { b.spec.balls = {0, 7}; }), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace sheetbend::testing
