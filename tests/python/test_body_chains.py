@@ -29,7 +29,7 @@ def chain(count: int, backwards: bool = False) -> tuple[sb.Scene, list[sb.Body],
 
 @pytest.mark.parametrize("backwards", [False, True])
 def test_a_chain_starts_where_its_angles_say(backwards: bool) -> None:
-    """Places, attitudes and velocities of six bodies by a product of rotations; their gradient by a complex step."""
+    """Places, attitudes and velocities of six bodies by a product of rotations; their gradient is exact."""
     scene, bodies, axes = chain(6, backwards)
     angles, rates = np.linspace(0.5, -0.7, 6), np.linspace(-2.0, 1.0, 6)
     values = {f"h{k}_angle": a for k, a in enumerate(angles)} | {f"h{k}_rate": w for k, w in enumerate(rates)}

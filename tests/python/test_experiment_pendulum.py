@@ -82,6 +82,20 @@ def test_friction_of_the_first_and_of_the_last_third_agree_or_are_doubted(single
         assert meet or "doubtful" in (one.verdict, other.verdict), (str(one), str(other))
 
 
+def test_a_rigid_body_on_a_hinge_finds_what_the_pendulum_finds(single: sb.Fit) -> None:
+    """Its length is a + I/(m a); frictions are those of its first moment m a, which is 0.26 % less."""
+    body, m, a = fitted(study("pendulum_bodies")), 0.14757, 0.14775490106282646
+    length, other = a + body["arm_inertia_2"].value / (m * a), single["arm_length"]
+    assert abs(length - other.value) < 0.1 * other.half_width
+    share = m * a / (0.14274 * other.value)
+    for name, known in (("hinge_friction", single["arm_friction"]), ("air_drag", single["arm_drag"])):
+        assert body[name].value == pytest.approx(share * known.value, rel=1e-3)
+        assert body[name].half_width == pytest.approx(share * known.half_width, rel=0.02)
+        assert body[name].verdict == known.verdict
+    pieces = [[r.held_out for r in fit.result.recordings if r.rows == 0] for fit in (body, single)]
+    assert len(pieces[0]) == 4 and pieces[0] == pytest.approx(pieces[1], rel=2e-3)
+
+
 @pytest.fixture(scope="module")
 def pushed(tmp_path_factory: pytest.TempPathFactory) -> tuple[sb.Fit, sb.Fit]:
     """Fits with pushes to the first and to the last third."""
