@@ -115,6 +115,18 @@ def test_a_chain_is_solved_as_one_dense_system() -> None:
     assert chain.log_size == pytest.approx(0.5 * np.linalg.slogdet(A.T @ A)[1], rel=1e-6)
 
 
+def test_a_state_that_no_row_feels_has_a_finite_covariance() -> None:
+    """It was infinite, and what the states take of the degrees of freedom no number, so a fit ended in an error."""
+    rng = np.random.default_rng(4)
+    windows = [Window(rng.standard_normal((5, 2)), rng.standard_normal((5, 1)), rng.standard_normal(5)) for _ in "abc"]
+    windows[2].state[:, 1] = 0.0
+    gaps = [Gap(*rng.standard_normal((2, 2, 2)), rng.standard_normal((2, 1)), rng.standard_normal(2)) for _ in "ab"]
+    gaps[1].behind[:, 1] = 0.0
+    chain = Chain(windows, gaps)
+    assert all(np.isfinite(part).all() for pair in chain.covariances() for part in pair)
+    assert chain.states()[2][1] == 0.0
+
+
 def test_windows_have_the_derivatives_of_their_rows() -> None:
     core = cut(swing(), 1e-3).core
     assert isinstance(core, Lifted)

@@ -16,6 +16,7 @@ import numpy as np
 from ..arrays.timeseries import Array
 
 WEAK = 1e-12  # of a column: what no row determines stays where it is
+UNFELT = 1e-100  # size of a column that no row feels: one, so that squares of its inverse stay finite
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,8 @@ class Chain:
                 gap = gaps[k]
                 parts.append(np.column_stack([gap.before, gap.behind, gap.border, gap.rest]))
             M = np.vstack(parts)
-            size = np.maximum(np.linalg.norm(M[:, :q], axis=0), np.finfo(float).tiny)
+            size = np.linalg.norm(M[:, :q], axis=0)
+            size = np.where(size > UNFELT, size, 1.0)
             weak = np.zeros((q, M.shape[1]))
             weak[:, :q] = np.diag(WEAK * size)
             R = np.asarray(np.linalg.qr(np.vstack([M, weak]), mode="r"))
