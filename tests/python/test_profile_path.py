@@ -192,6 +192,21 @@ def test_a_point_without_an_answer_is_left_to_refits() -> None:
     assert math.isnan(lower) and math.isnan(upper) and m.evaluations <= 4
 
 
+def test_an_end_beyond_a_kink_is_left_to_refits() -> None:
+    """Behind 1.5 there is a residual that the other number lowers, of which the Jacobian at the estimate shows
+    nothing."""
+
+    def residuals(u: np.ndarray) -> np.ndarray:
+        beyond = np.where(np.real(u[0]) > 1.5, u[0] - 1.5, 0.0)
+        return np.array([u[0], u[1], 0.5 * beyond * (1.0 - 6.0 * u[1])])
+
+    m, u, wide = Model(residuals, np.full(2, -np.inf), np.full(2, np.inf)), np.zeros(2), np.full(2, np.inf)
+    picture, first = Linear(u, residuals(u), m.jacobian(u)), reach(m.jacobian(u), 0)
+    assert ProfilePath(m, picture, 0, first, (-wide, wide), np.ones(2)).ends(first) == (-2.0, 2.0)
+    lower, upper = ProfilePath(m, picture, 0, first, (-wide, wide), np.ones(2), kinked=True).ends(first)
+    assert lower == -2.0 and math.isnan(upper) and m.jacobians == 2
+
+
 # --- of a motion
 
 

@@ -116,7 +116,8 @@ class Profiles:
         parameter, column = parameters[name], parameters.free.index(name)
         by = self._moved[self._problem.parameters.free.index(name)]
         limits, longest = parameters.limits(), step_limits(parameters)
-        path = ProfilePath(part.evaluate, linear, column, wanted.reach, limits, longest)
+        kinked = any(e.scene.compiled.bends_over_values for e in part.experiments)
+        path = ProfilePath(part.evaluate, linear, column, wanted.reach, limits, longest, kinked)
         first = min(wanted.reach, 1.0) if parameter.log else wanted.reach
         told = path.ends(first)
         rose, there = path.lowest()
@@ -142,8 +143,10 @@ class Profiles:
         curve = [(0.0, 0.0)]
         for side, end, other in zip((-1.0, 1.0), told, refitted, strict=True):
             if math.isnan(end):
+                last = math.inf if other is None or math.isnan(other) else abs(parameter.to_internal(other) - at)
                 points = [(parameter.to_internal(value) - at, height - cost) for value, height in asked.items()]
-                curve += [(t, rise / path.rise) for t, rise in points if t * side > 0.0 and math.isfinite(rise)]
+                curve += [(t, rise / path.rise) for t, rise in points if 0.0 < t * side < last and math.isfinite(rise)]
+                curve += [(side * last, 1.0)] if math.isfinite(last) else []
                 found = other
             else:
                 curve += path.curve(side, end)

@@ -15,6 +15,9 @@ what drives a scene, priors that count as they are) as the linear interval has i
 
 J need not be exact for that: it only has to show how much the others' step would still take off (`Point.slack`), and
 the error of that is of second order. Where its change is as large as J itself, it is made again.
+
+Where a motion has kinks (a hinge that sticks and slides), residuals beyond one may fall lower with other derivatives,
+of which J shows nothing. There both ends are looked at with the Jacobian there; one that moves is left to refits.
 """
 
 from __future__ import annotations
@@ -39,6 +42,7 @@ SLACK = 0.05  # of the rise: what the others may leave there, which shifts an en
 CURVED = 0.6  # of the way of the residuals: where they are so far from r + J d, J is made again
 STRIDE = 2.5  # times the farthest distance so far
 CURVE = 4  # points of a curve on each side
+KINKED = 0.003  # of the height: by so much an end may move with its own Jacobian where motions have kinks
 WEAK = 0.01  # of the rise: what the others' longest steps must promise to be worth taking
 
 Evaluate = Callable[[Array, bool], tuple[bool, Array, Array]]
@@ -87,6 +91,7 @@ class ProfilePath:
         reach: distance of the ends that are looked for in the linear picture.
         limits: (p,) each, of the search.
         longest: (p,) longest steps; infinite where there is none.
+        kinked: whether motions have kinks.
         points: that were evaluated, in order.
         rise: of the cost at the ends.
     """
@@ -97,6 +102,7 @@ class ProfilePath:
     reach: float
     limits: tuple[Array, Array]
     longest: Array
+    kinked: bool = False
     points: list[Point] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -123,10 +129,12 @@ class ProfilePath:
         Returns:
             Infinite on a side where the cost does not rise so far up to the limit, NaN where the path does not settle.
         """
-        lower = self._evaluated(-first, -1.0, straight=True)
-        if self._confirms(lower) and self._confirms(self._evaluated(first, 1.0, straight=True)):
-            return -self.reach, self.reach
-        return self._end(-1.0), self._end(1.0)
+        one = self._evaluated(-first, -1.0, straight=True)
+        if self._confirms(one) and self._confirms(self._evaluated(first, 1.0, straight=True)):
+            lower, upper = -self.reach, self.reach
+        else:
+            lower, upper = self._end(-1.0), self._end(1.0)
+        return self._without_kink(lower, -1.0), self._without_kink(upper, 1.0)
 
     def curve(self, side: float, end: float) -> list[tuple[float, float]]:
         """(distance from the estimate, rise of the profile over that at the ends) along one side (-1 or 1): up to a
@@ -193,6 +201,14 @@ class ProfilePath:
             return None
         self._others[side] = Others(*np.linalg.qr(J), self.column, self._ridge, self.limits)
         return self._keep(self._point(at.t, at.u, at.r, side))
+
+    def _without_kink(self, end: float, side: float) -> float:
+        """The end, or NaN where motions have kinks and the Jacobian at the nearest point shows another height."""
+        at = self._nearest(side)
+        if not self.kinked or at is None or not math.isfinite(end):
+            return end
+        again = self._made_again(at, side)
+        return end if again is not None and abs(again.height - at.height) <= KINKED else math.nan
 
     def _evaluated(self, t: float, side: float, straight: bool = False) -> Point | None:
         """The point there, or at the limit before it; None where there is no room or the physics has no answer.

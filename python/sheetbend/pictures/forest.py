@@ -42,7 +42,8 @@ def _panel(panel: Axes, found: Collected, trait: Trait, specimens: list[str], na
     ends = [inverse(x) for x in p.mean_interval]
     panel.plot(ends, [last + 0.5] * 2, color=ACCENT, linewidth=2.0)
     panel.plot([inverse(p.mean)], [last + 0.5], "D", color=ACCENT, markersize=4.5)
-    panel.set_yticks([*range(last), last + 0.5], [*specimens, "mean"] if names else [""] * (last + 1))
+    mean = "mean" if last == len(found.fits) else f"mean of all {len(found.fits):,}"
+    panel.set_yticks([*range(last), last + 0.5], [*specimens, mean] if names else [""] * (last + 1))
     panel.set_ylim(last + 1.2, -0.8)
     panel.xaxis.set_major_locator(require("matplotlib.ticker", "plot").MaxNLocator(4))
     panel.set_xlabel(f"{trait.name} [{trait.unit}]" if trait.unit else trait.name)

@@ -16,7 +16,7 @@ from . import pieces
 from .balls import Balls
 from .collider_speeds import Fastest, fastest
 from .domain import Domain
-from .kinks import kinks
+from .kinks import kinks, of_the_state
 from .scene_data import SceneData
 from .settle import SettledStart, settled
 
@@ -75,6 +75,7 @@ class CompiledScene:
         contacts: names of those that particles may have with colliders.
         touches_itself: whether any rope or cloth may touch itself or another, or particles may hit each other.
         kinks: what beside contacts makes its motions not smooth in time, in words; empty if nothing.
+        bends_over_values: whether any of it makes motions not smooth over quantities, either.
         settled: by contact, what started inside a collider and was moved to its surface.
         fastest: the colliders that move and could pass particles unseen.
         domain: which quantities and inputs make sense.
@@ -95,7 +96,7 @@ class CompiledScene:
         self.kinds = frozenset(g.kind for g in scene.groups)
         self.names = tuple(scene.quantities)
         self.theta = np.array([q.value for q in scene.quantities.values()], dtype=float)
-        self.kinks = kinks(scene)
+        self.kinks, self.bends_over_values = kinks(scene), bool(of_the_state(scene))
         self.domain = Domain(scene, self.layout)
         self._base = self._pack(scene)
         self._terms = scene.every_term
