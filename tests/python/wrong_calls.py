@@ -507,6 +507,9 @@ OBJECTS: dict[str, Callable[[], Call]] = {
     "cylinder": lambda: _joint(sb.cylinder, axis=UP, rate=0.0, turn_rate=0.0),
     "universal": lambda: _joint(sb.universal, axes=[(1, 0, 0), (0, 1, 0)]),
     "fixed": lambda: _joint(sb.fixed),
+    "attach": lambda: (
+        lambda scene, body: (sb.attach, {"body": body, "particles": scene.add_particles(np.eye(3), 1.0), "name": "g"})
+    )(*bodies()),
     "Joint.angle": lambda: (
         lambda call: (call[0](**call[1]).angle, {"motion": sb.simulate(call[1]["upper"].scene, TIMES, STEP)})
     )(_joint(sb.hinge, axis=(0, 1, 0))),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays.checks import check_label
 from ..errors import SceneError
 from ..quantities.expression import expressions
 from ..scene.body import Body, BodyPoint
@@ -37,8 +38,9 @@ def attach(body: Body, particles: ArrayLike, *, name: str | None = None) -> str:
     if not isinstance(body, Body):
         raise SceneError("attach.body", "is no body", body, "give what Scene.add_body returned")
     scene: Scene = body.scene  # type: ignore[assignment]  # the one that bodies are made in
-    where, own = f"{body.name}.attach", np.ravel(particles).tolist()
-    scene.node_array(where, own)
+    where, group = "attach.particles", f"{body.name}_attached" if name is None else name
+    check_label("attach.name", group)
+    own = scene.node_array(where, particles).tolist()
     taken = {p for b in scene.bodies.values() for p in (*b.particles.tolist(), *b.attached)}
     bad = sorted({p for p in own if own.count(p) > 1 or p in taken or p in scene.held})
     if bad:
@@ -50,7 +52,6 @@ def attach(body: Body, particles: ArrayLike, *, name: str | None = None) -> str:
     body.attached |= dict(zip(own, places, strict=True))
     p, *axes = body.particles.tolist()
     weights = np.stack([body.coordinates(expressions(x)) for x in places])
-    group = f"{body.name}_attached" if name is None else name
     constrain(scene, "coincide_particle", group, [[p, one, *axes] for one in own], weights)
     return group
 
