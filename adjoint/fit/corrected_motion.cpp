@@ -186,7 +186,7 @@ Response CorrectedMotion::response(double tolerance, int threads, Interrupt* int
         MatrixXd::Zero(last ? 0 : static_cast<Index>(4 * e_.scene->dofs() + s.onward.size()), directions);
     parallel_for((directions + 7) / 8, threads, 1, [&](int begin, int end) {
       for (int first = 8 * begin; first < std::min(8 * end, directions); first += 8)
-        march(s, unit, carried, first, std::min(8, directions - first), segment.G, reached, interrupt);
+        march({s, unit, carried, first, std::min(8, directions - first)}, segment.G, reached, interrupt);
     });
     segment.R.resize(0, directions);
     if (last) break;
@@ -197,51 +197,69 @@ Response CorrectedMotion::response(double tolerance, int threads, Interrupt* int
   return found;
 }
 
-// Directions `first` to first + width of a stretch, from where they begin: their columns of G, and of what is reached at its end.
-void CorrectedMotion::march(const Stretch& s, const Unit& unit, const MatrixXd& carried, int first, int width,
-                            MatrixXd& G, MatrixXd& reached, Interrupt* interrupt) const {
-  const Scene& scene = *e_.scene;
-  const std::size_t dofs = scene.dofs();
-  const int brought = static_cast<int>(carried.cols()), from = first < brought ? s.begin : s.at[first - brought];
-  const auto each_brought = [&](auto&& body) {
-    for (int k = 0; k < std::min(width, brought - first); ++k) body(k, carried.col(first + k));
-  };
-  const std::vector<double>& values = from == 0 ? inputs_ : start_;
-  std::vector<Eight> in(values.begin(), values.end());
+// Tangents of the numbers of the correction.
+std::vector<Eight> CorrectedMotion::moved_numbers(const Directions& d) const {
+  const std::size_t dofs = e_.scene->dofs();
   std::vector<Eight> b(e_.correction.count());
-  each_brought([&](int k, const auto& direction) {
-    for (std::size_t i = 0; i < s.acting.size(); ++i) b[s.acting[i]].d[k] = unit.place * direction[4 * dofs + i];
+  d.each_brought([&](int k, const auto& direction) {
+    for (std::size_t i = 0; i < d.stretch.acting.size(); ++i)
+      b[d.stretch.acting[i]].d[k] = d.unit.place * direction[4 * dofs + i];
   });
-  for (int k = std::max(0, brought - first); k < width; ++k) {
-    const int number = s.numbers[first + k - brought];
+  for (int k = std::max(0, d.brought() - d.first); k < d.width; ++k) {
+    const int number = d.stretch.numbers[d.first + k - d.brought()];
     b[number].d[k] = e_.correction.sigma[number];
   }
-  for (const auto* numbers : {&s.acting, &s.numbers})
+  return b;
+}
+
+// The inputs with these tangents, and those of what the motion starts at.
+std::vector<Eight> CorrectedMotion::moved_inputs(const Directions& d, const std::vector<Eight>& b,
+                                                 Interrupt* interrupt) const {
+  const Scene& scene = *e_.scene;
+  const bool starts = d.from() == 0;
+  const std::vector<double>& values = starts ? inputs_ : start_;
+  std::vector<Eight> in(values.begin(), values.end());
+  for (const auto* numbers : {&d.stretch.acting, &d.stretch.numbers})
     for (const int i : *numbers)
       e_.correction.apply(i, b[i], in.data());  // of value zero: they are in the inputs already
-  if (from == 0 && rest_) {
+  if (starts && rest_) {
     const auto x = equilibrium_coordinates<Eight>(scene, in.data(), e_.equilibrium, *e_.anchor, interrupt);
     std::copy(x.begin(), x.end(), &in[scene.layout.of(Quantity::position)]);
-  } else if (from == 0 && settled_) {
+  } else if (starts && settled_) {
     const auto x = settled_coordinates<Eight>(scene, *e_.settling, in.data(), e_.t0);
     std::copy(x.begin(), x.end(), &in[scene.layout.of(Quantity::position)]);
   }
-  Rollout<Eight> rollout(scene, e_.plan, in.data(), e_.t0);
-  if (from > 0) {
-    std::vector<double> v(dofs), v_before(dofs);
-    const double* v0 = &start_[scene.layout.of(Quantity::velocity)];
-    tape_->velocity(from, v0, v.data());
-    tape_->velocity(from - 1, v0, v_before.data());
-    const double* parts[4] = {&states_[from * dofs], &states_[(from - 1) * dofs], v.data(), v_before.data()};
-    std::array<std::vector<Eight>, 4> state;
-    for (std::size_t part = 0; part < 4; ++part) {
-      state[part].assign(parts[part], parts[part] + dofs);
-      each_brought([&](int k, const auto& direction) {
-        for (std::size_t i = 0; i < dofs; ++i) state[part][i].d[k] = unit.of(part) * direction[part * dofs + i];
-      });
-    }
-    rollout.restart(from, {state[0].data(), state[1].data(), state[2].data(), state[3].data(), from});
+  return in;
+}
+
+// Lets a rollout go on from the state where directions begin, with their tangents.
+void CorrectedMotion::restart(const Directions& d, Rollout<Eight>& rollout) const {
+  const std::size_t dofs = e_.scene->dofs();
+  const int from = d.from();
+  std::vector<double> v(dofs), v_before(dofs);
+  const double* v0 = &start_[e_.scene->layout.of(Quantity::velocity)];
+  tape_->velocity(from, v0, v.data());
+  tape_->velocity(from - 1, v0, v_before.data());
+  const double* parts[4] = {&states_[from * dofs], &states_[(from - 1) * dofs], v.data(), v_before.data()};
+  std::array<std::vector<Eight>, 4> state;
+  for (std::size_t part = 0; part < 4; ++part) {
+    state[part].assign(parts[part], parts[part] + dofs);
+    d.each_brought([&](int k, const auto& direction) {
+      for (std::size_t i = 0; i < dofs; ++i) state[part][i].d[k] = d.unit.of(part) * direction[part * dofs + i];
+    });
   }
+  rollout.restart(from, {state[0].data(), state[1].data(), state[2].data(), state[3].data(), from});
+}
+
+// Fills the columns of these directions in G, and in what is reached at the end of their stretch.
+void CorrectedMotion::march(const Directions& d, MatrixXd& G, MatrixXd& reached, Interrupt* interrupt) const {
+  const Scene& scene = *e_.scene;
+  const Stretch& s = d.stretch;
+  const std::size_t dofs = scene.dofs();
+  const int from = d.from();
+  const std::vector<Eight> b = moved_numbers(d), in = moved_inputs(d, b, interrupt);
+  Rollout<Eight> rollout(scene, e_.plan, in.data(), e_.t0);
+  if (from > 0) restart(d, rollout);
 
   const std::vector<Eight> offsets(inputs_.begin() + static_cast<std::ptrdiff_t>(scene.layout.total()), inputs_.end());
   std::vector<Eight> ring(4 * dofs), x(dofs), r(3 * e_.observed.markers.size());
@@ -257,8 +275,8 @@ void CorrectedMotion::march(const Stretch& s, const Unit& unit, const MatrixXd& 
       const Eight* end =
           frame_residuals(e_.observed, next, x.data(), offsets.data(), r.data(), static_cast<Eight*>(nullptr));
       const auto row = static_cast<Index>(first_row_[next] - first_row_[s.frames[0]]);
-      for (int k = 0; k < width; ++k)
-        for (std::ptrdiff_t i = 0; i < end - r.data(); ++i) G(row + i, first + k) = r[i].d[k];
+      for (int k = 0; k < d.width; ++k)
+        for (std::ptrdiff_t i = 0; i < end - r.data(); ++i) G(row + i, d.first + k) = r[i].d[k];
     }
   };
   keep(from);
@@ -269,12 +287,12 @@ void CorrectedMotion::march(const Stretch& s, const Unit& unit, const MatrixXd& 
     if (step != s.end || reached.size() == 0) continue;
     const SubstepStates<Eight> now = rollout.state();
     const Eight* parts[4] = {now.x, now.x_before, now.v, now.v_before};
-    for (int k = 0; k < width; ++k) {
+    for (int k = 0; k < d.width; ++k) {
       for (std::size_t part = 0; part < 4; ++part)
         for (std::size_t i = 0; i < dofs; ++i)
-          reached(part * dofs + i, first + k) = parts[part][i].d[k] / unit.of(part);
+          reached(part * dofs + i, d.first + k) = parts[part][i].d[k] / d.unit.of(part);
       for (std::size_t i = 0; i < s.onward.size(); ++i)
-        reached(4 * dofs + i, first + k) = b[s.onward[i]].d[k] / unit.place;
+        reached(4 * dofs + i, d.first + k) = b[s.onward[i]].d[k] / d.unit.place;
     }
   }
 }

@@ -3,6 +3,7 @@
 // came before (as in reduced-rank square root filters: Verlaan & Heemink 1997).
 #pragma once
 
+#include <algorithm>
 #include <optional>
 
 #include "adjoint/fit/corrected.h"
@@ -32,13 +33,30 @@ class CorrectedMotion : public Corrected {
     double place, velocity;
     double of(std::size_t part) const { return part < 2 ? place : velocity; }
   };
+  // Directions `first` to first + width of a stretch.
+  struct Directions {
+    const Stretch& stretch;
+    const Unit& unit;
+    const Eigen::MatrixXd& carried;
+    int first, width;
+
+    int brought() const { return static_cast<int>(carried.cols()); }
+    int from() const { return first < brought() ? stretch.begin : stretch.at[first - brought()]; }  // their substep
+    template <class F>
+    void each_brought(F&& body) const {
+      for (int k = 0; k < std::min(width, brought() - first); ++k) body(k, carried.col(first + k));
+    }
+  };
   struct Acts {
     int from, until;  // substeps at which a number changes the motion's inputs
   };
   Acts acts(int number) const;
   std::vector<Stretch> stretches() const;
-  void march(const Stretch& s, const Unit& unit, const Eigen::MatrixXd& carried, int first, int width,
-             Eigen::MatrixXd& G, Eigen::MatrixXd& reached, Interrupt* interrupt) const;
+  std::vector<Dual<double, 8>> moved_numbers(const Directions& d) const;
+  std::vector<Dual<double, 8>> moved_inputs(const Directions& d, const std::vector<Dual<double, 8>>& b,
+                                            Interrupt* interrupt) const;
+  void restart(const Directions& d, Rollout<Dual<double, 8>>& rollout) const;
+  void march(const Directions& d, Eigen::MatrixXd& G, Eigen::MatrixXd& reached, Interrupt* interrupt) const;
 
   int last_;
   std::vector<double> start_;  // the inputs with the equilibrium or the settled places that the motion starts at

@@ -114,41 +114,48 @@ Eigen::VectorXd Projection::predicted(const double* u) const {
 // theta: they go downhill whatever A is, are shortened until they lower the cost, and make A anew where they are many. Where no length of theirs lowers
 // it, A is made anew, and from then on steps are damped (Levenberg 1944) for as long as that is needed: far from the truth a long motion answers noise
 // by much more than in proportion.
-void Projection::solve(const std::vector<double>& theta, const double* u, double* residual, Interrupt* interrupt) {
-  using Eigen::VectorXd;
-  renew(interrupt);
-  VectorXd trial = predicted(u), best, gradient, step;
-  std::vector<std::pair<VectorXd, VectorXd>> pairs;  // steps and what they change in the gradient
-  std::unique_ptr<Corrected> there;                  // at best
-  double cost = std::numeric_limits<double>::infinity(), decrease = cost, damping = 0.0;
-  int halvings = 0, since = 0;  // steps since A was made, or since this theta began
-  bool fresh = false;           // A is of `best`
-  const auto newton = [&] {
-    VectorXd q = gradient;
-    std::vector<double> along(pairs.size());
-    for (std::size_t i = pairs.size(); i-- > 0;) {
-      const auto& [s, y] = pairs[i];
-      along[i] = s.dot(q) / s.dot(y);
-      q -= along[i] * y;
+class Projection::Descent {
+ public:
+  using VectorXd = Eigen::VectorXd;
+
+  Descent(Projection& of, const std::vector<double>& theta, double* residual, Interrupt* interrupt)
+      : of_(of), theta_(theta), residual_(residual), interrupt_(interrupt) {}
+
+  // The b at which cost and prior balance, whose residuals are written.
+  VectorXd run(VectorXd trial) {
+    for (int turn = 0; turn < most_steps; ++turn) {
+      auto here = evaluate(trial);
+      const double cost = here ? 0.5 * (sum_of_squares(here->residuals()) + trial.squaredNorm()) : cost_;
+      if (cost < cost_) {
+        accept(std::move(here), trial, cost);
+      } else if (std::isinf(cost_)) {  // predicted too far
+        if (trial == of_.b_) throw Diverged(of_.e_->steps(), 0, of_.e_->observed.times.back());
+        trial = of_.b_;
+        continue;
+      } else if (damping_ == 0.0 && ++halvings_ <= most_halvings) {
+        step_ *= 0.5;
+        trial = best_ + step_;
+        continue;
+      } else if (!guide_anew()) {
+        break;
+      }
+      step_ = -newton();
+      decrease_ = -0.5 * gradient_.dot(step_) + 0.5 * damping_ * step_.squaredNorm();
+      if (damping_ == 0.0 && decrease_ <= converged * cost_) break;
+      halvings_ = 0;
+      trial = best_ + step_;
     }
-    q = factor_.solve(q).eval();
-    for (std::size_t i = 0; i < pairs.size(); ++i) {
-      const auto& [s, y] = pairs[i];
-      q += (along[i] - y.dot(q) / s.dot(y)) * s;
-    }
-    return q;
-  };
-  const auto relinearize = [&] {
-    linearize(*there, {theta, e_->correction.at(best), guiding}, damping, interrupt);
-    pairs.clear();
-    since = 0;
-    fresh = true;
-  };
-  for (int turn = 0; turn < most_steps; ++turn) {
-    const bool must = std::isinf(cost) && trial == b_;  // there is nothing else to try
-    std::unique_ptr<Corrected> here;
+    if (damping_ > 0.0) of_.factor(0.0);
+    if (damping_ > 0.0 || !(decrease_ <= within_rounding * cost_)) throw NoCorrection();
+    return best_;
+  }
+
+ private:
+  // Null where there is no motion and something else to try.
+  std::unique_ptr<Corrected> evaluate(const VectorXd& trial) const {
+    const bool must = std::isinf(cost_) && trial == of_.b_;
     try {
-      here = Corrected::at(*e_, theta.data(), e_->correction.at(trial).data(), interrupt);
+      return Corrected::at(*of_.e_, theta_.data(), of_.e_->correction.at(trial).data(), interrupt_);
     } catch (const Diverged&) {
       if (must) throw;
     } catch (const Unconverged&) {
@@ -156,54 +163,81 @@ void Projection::solve(const std::vector<double>& theta, const double* u, double
     } catch (const NoEquilibrium&) {
       if (must) throw;
     }
-    const double cost_here = here ? 0.5 * (sum_of_squares(here->residuals()) + trial.squaredNorm()) : cost;
-    if (!(cost_here < cost)) {
-      if (std::isinf(cost)) {  // predicted too far
-        if (must) throw Diverged(e_->steps(), 0, e_->observed.times.back());
-        trial = b_;
-        continue;
-      }
-      if (damping == 0.0 && ++halvings <= most_halvings) {
-        step *= 0.5;
-        trial = best + step;
-        continue;
-      }
-      if (damping > largest_damping || (damping == 0.0 && decrease <= within_rounding * cost)) break;
-      if (!fresh) {
-        relinearize();
-      } else {
-        damping = std::max(least_damping, 10.0 * damping);
-        pairs.clear();
-        factor(damping);
-      }
-    } else {
-      const double gain = (cost - cost_here) / decrease;
-      const std::vector<double> by_b = here->gradient(interrupt);
-      VectorXd next =
-          VectorXd::Map(e_->correction.sigma.data(), unknowns()).cwiseProduct(VectorXd::Map(by_b.data(), unknowns())) +
-          trial;
-      if (step.size() > 0 && step.dot(next - gradient) > 0.0) pairs.emplace_back(step, next - gradient);
-      best = trial;
-      there = std::move(here);
-      gradient = std::move(next);
-      cost = cost_here;
-      fresh = false;
-      std::copy(there->residuals().begin(), there->residuals().end(), residual);
-      const bool damped = damping > 0.0;
-      if (damped && gain > 0.5) damping = damping <= least_damping ? 0.0 : 0.1 * damping;
-      if (!known_ || damped || since++ == steps_per_response) relinearize();
-    }
-    step = -newton();
-    decrease = -0.5 * gradient.dot(step) + 0.5 * damping * step.squaredNorm();
-    if (damping == 0.0 && decrease <= converged * cost) break;
-    halvings = 0;
-    trial = best + step;
+    return nullptr;
   }
-  if (damping > 0.0) factor(0.0);
-  if (damping > 0.0 || !(decrease <= within_rounding * cost)) throw NoCorrection();
-  b_ = best;
-  solved_ = VectorXd::Map(u, parameters_);
-  given_ = e_->correction.at(best);
+
+  void accept(std::unique_ptr<Corrected> here, const VectorXd& trial, double cost) {
+    const double gain = (cost_ - cost) / decrease_;
+    const std::vector<double> by_b = here->gradient(interrupt_);
+    const int unknowns = of_.unknowns();
+    VectorXd next =
+        VectorXd::Map(of_.e_->correction.sigma.data(), unknowns).cwiseProduct(VectorXd::Map(by_b.data(), unknowns)) +
+        trial;
+    if (step_.size() > 0 && step_.dot(next - gradient_) > 0.0) pairs_.emplace_back(step_, next - gradient_);
+    best_ = trial;
+    there_ = std::move(here);
+    gradient_ = std::move(next);
+    cost_ = cost;
+    fresh_ = false;
+    std::copy(there_->residuals().begin(), there_->residuals().end(), residual_);
+    const bool damped = damping_ > 0.0;
+    if (damped && gain > 0.5) damping_ = damping_ <= least_damping ? 0.0 : 0.1 * damping_;
+    if (!of_.known_ || damped || since_++ == steps_per_response) relinearize();
+  }
+
+  // After steps that lowered nothing: with an A made here, then with more damping. False where nothing is left to gain, or to try.
+  bool guide_anew() {
+    if (damping_ > largest_damping || (damping_ == 0.0 && decrease_ <= within_rounding * cost_)) return false;
+    if (!fresh_) {
+      relinearize();
+    } else {
+      damping_ = std::max(least_damping, 10.0 * damping_);
+      pairs_.clear();
+      of_.factor(damping_);
+    }
+    return true;
+  }
+
+  void relinearize() {
+    of_.linearize(*there_, {theta_, of_.e_->correction.at(best_), guiding}, damping_, interrupt_);
+    pairs_.clear();
+    since_ = 0;
+    fresh_ = true;
+  }
+
+  VectorXd newton() const {
+    VectorXd q = gradient_;
+    std::vector<double> along(pairs_.size());
+    for (std::size_t i = pairs_.size(); i-- > 0;) {
+      const auto& [s, y] = pairs_[i];
+      along[i] = s.dot(q) / s.dot(y);
+      q -= along[i] * y;
+    }
+    q = of_.factor_.solve(q).eval();
+    for (std::size_t i = 0; i < pairs_.size(); ++i) {
+      const auto& [s, y] = pairs_[i];
+      q += (along[i] - y.dot(q) / s.dot(y)) * s;
+    }
+    return q;
+  }
+
+  Projection& of_;
+  const std::vector<double>& theta_;
+  double* residual_;
+  Interrupt* interrupt_;
+  VectorXd best_, gradient_, step_;
+  std::vector<std::pair<VectorXd, VectorXd>> pairs_;  // steps and what they change in the gradient
+  std::unique_ptr<Corrected> there_;                  // at best_
+  double cost_ = std::numeric_limits<double>::infinity(), decrease_ = cost_, damping_ = 0.0;
+  int halvings_ = 0, since_ = 0;  // steps since A was made, or since this theta began
+  bool fresh_ = false;            // A is of best_
+};
+
+void Projection::solve(const std::vector<double>& theta, const double* u, double* residual, Interrupt* interrupt) {
+  renew(interrupt);
+  b_ = Descent(*this, theta, residual, interrupt).run(predicted(u));
+  solved_ = Eigen::VectorXd::Map(u, parameters_);
+  given_ = e_->correction.at(b_);
   if (exact_)
     linearize(*Corrected::at(*e_, theta.data(), given_.data(), interrupt), {theta, given_, exact}, 0.0, interrupt);
   exact_ = false;

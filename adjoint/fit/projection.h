@@ -60,6 +60,7 @@ class Projection {
   void restore(const double*& numbers);
 
  private:
+  class Descent;
   std::size_t residuals() const { return e_->residual_count(); }
   Eigen::VectorXd predicted(const double* u) const;
   // A at (theta, b), where `here` was made.

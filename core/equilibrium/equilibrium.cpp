@@ -189,6 +189,28 @@ bool EquilibriumSolver::leave_saddle(State& s, double& mu) {
   return s.falling;
 }
 
+// A step of pseudo-time, with mu raised until it is to be trusted; the next one then begins with less. False where no mu helps. Multipliers that
+// are but guessed go first.
+bool EquilibriumSolver::damped_step(State& s, double& mu, bool guessed) {
+  s.soften();
+  if (mu == 0.0) {
+    if (guessed) {
+      std::fill(s.lambda.begin(), s.lambda.end(), 0.0);
+      assemble(s);
+    }
+    mu = s.first_pseudo_stiffness(kkt_);
+  }
+  bool accepted = false;
+  const double least = mu;
+  for (int tries = 0; tries < 40 && !(accepted = step(s, mu, s.softened.data())); ++tries) mu *= 4.0;
+  if (!accepted) mu = least;
+  // What is rigid asks for its whole way in one step, whatever mu is.
+  for (double share = 0.25; share > 1e-9 && !accepted; share *= 0.25, mu *= 4.0)
+    accepted = step(s, mu, s.softened.data(), share);
+  mu *= 0.1;
+  return accepted;
+}
+
 Equilibrium EquilibriumSolver::solve(const double* inputs, const double* start_x, const double* start_lambda,
                                      const EquilibriumOptions& options, Interrupt* interrupt) {
   State s(scene_, inputs, start_x, start_lambda, options);
@@ -218,25 +240,8 @@ Equilibrium EquilibriumSolver::solve(const double* inputs, const double* start_x
       result.converged = newton = false;
       continue;
     }
-    bool accepted = newton && step(s, 0.0, s.compliance.data());
-    if (!accepted) {
-      s.soften();
-      if (mu == 0.0) {
-        if (!start_lambda && result.iterations == 1) {
-          std::fill(s.lambda.begin(), s.lambda.end(), 0.0);
-          assemble(s);
-        }
-        mu = s.first_pseudo_stiffness(kkt_);
-      }
-      const double least = mu;
-      for (int tries = 0; tries < 40 && !(accepted = step(s, mu, s.softened.data())); ++tries) mu *= 4.0;
-      if (!accepted) mu = least;
-      // What is rigid asks for its whole way in one step, whatever mu is.
-      for (double share = 0.25; share > 1e-9 && !accepted; share *= 0.25, mu *= 4.0)
-        accepted = step(s, mu, s.softened.data(), share);
-      mu *= 0.1;
-    }
-    if (!accepted) break;
+    const bool guessed = !start_lambda && result.iterations == 1;
+    if (!(newton && step(s, 0.0, s.compliance.data())) && !damped_step(s, mu, guessed)) break;
     newton = true;
     s.measure();
   }

@@ -73,6 +73,7 @@ class EquilibriumSolver {
     std::vector<double> direction;  // (dofs)
   };
   Mode lowest_mode(const State& s);
+  bool damped_step(State& s, double& mu, bool guessed);
   bool leave_saddle(State& s, double& mu);
 
   void find_redundant_rows(State& s);

@@ -60,6 +60,11 @@ class Kkt {
  private:
   using Factor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Upper, Eigen::NaturalOrdering<int>>;
 
+  template <class F>
+  void for_each_pair(const std::vector<int>& number, F&& f) const;
+  std::vector<Eigen::Triplet<double>> order_unknowns();
+  void set_pattern(std::vector<Eigen::Triplet<double>> upper);
+  void find_positions();
   void condensed_solve(const std::vector<double>& b_x, const std::vector<double>& b_l, bool transposed,
                        std::vector<double>& x, std::vector<double>& lambda) const;
   bool factorize_whole();
