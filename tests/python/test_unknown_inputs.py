@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 import sheetbend as sb
 import tomli_w
 from commands import run
+from sheetbend import pesto
 from sheetbend.cli.figures import figure_files
 from sheetbend.config import load
 from sheetbend.config.values import with_values
@@ -146,6 +149,8 @@ def test_an_unknown_wind_is_added_to_the_constant_one() -> None:
     _matches_differences(FitProblem([e], as_parameters(["cloth_bending", *own.modes[:7]], [e])))
     with pytest.raises(sb.SceneError, match=r"wind: changes over given times already"):
         sb.add_unknown_wind(flag(wind=wind, times=own.times), scale=1.0, spacing=0.1, duration=0.5)
+    with pytest.raises(sb.SceneError, match=r"wind: blows on nothing"):
+        sb.add_unknown_wind(hung(), scale=1.0, spacing=0.1, duration=0.5)
 
 
 def _matches_differences(problem: FitProblem) -> None:
@@ -259,6 +264,17 @@ def test_a_force_is_zero_in_a_recording_that_is_only_predicted() -> None:
             assert np.sqrt(np.mean((force - truth)[2:-1] ** 2)) < 0.4 * np.std(truth)
 
 
+@pytest.mark.parametrize(("count", "predict"), [(1, "mean"), (2, "mean"), (1, "window")])
+def test_a_force_may_be_in_predicted_recordings_alone(count: int, predict: Literal["mean", "window"]) -> None:
+    """The fit ended in StopIteration or KeyError."""
+    first, _ = seen(6, "first")
+    predicted = [replace(e, predict=predict) for e, _ in (seen(7, "second"), seen(8, "third"))][:count]
+    fit = sb.fit([replace(first, scene=hung(unknown=False)), *predicted], parameters=["rope_EI"], **ALONE)
+    assert fit.result.over_time == () and [e.name for e in fit.result.estimates] == ["rope_EI"]
+    values = fit.values_of(predicted[-1])
+    assert any(values[mode] for mode in hung().over_time["push"].modes) == (predict == "window")
+
+
 def test_what_makes_no_input_is_refused() -> None:
     scene = hung(unknown=False)
     for more, words in (
@@ -285,7 +301,7 @@ def test_what_makes_no_input_is_refused() -> None:
         sb.add_unknown_force(frozen, [2], name="other", **PUSH)
 
 
-def test_an_input_that_does_not_suit_its_recording_is_refused() -> None:
+def test_an_input_that_does_not_suit_its_recording_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     e, _ = seen(0)
 
     def refused(scene: sb.Scene, **more: Any) -> str:
@@ -301,6 +317,9 @@ def test_an_input_that_does_not_suit_its_recording_is_refused() -> None:
     many = [replace(e, name=f"e{k}") for k in range(20)]
     with pytest.raises(sb.InputError, match=r"scene: has unknown inputs over time"):
         sb.fit_many(many, ["rope_EI"])
+    monkeypatch.setitem(sys.modules, "pypesto", ModuleType("pypesto"))
+    with pytest.raises(sb.InputError, match=r"scene: has unknown inputs over time"):
+        pesto.problem(e, parameters=["rope_EI"])
 
 
 def test_a_configuration_fits_a_force(tmp_path: Path) -> None:

@@ -69,10 +69,10 @@ class Fields:
             return ()
         found = []
         for i, field in enumerate(self._fields):
+            if not isinstance(field.modes, OverTime):
+                continue
             begin = 0
             for recording, (modes, names) in zip(self._recordings(field), field.each, strict=True):
-                if not isinstance(modes, OverTime):
-                    continue
                 own = self._picture.columns[i][begin : begin + len(names)]
                 begin += len(names)
                 half, left, _ = spread(self._picture, self._fields, i, None, (modes, own))

@@ -121,6 +121,7 @@ def with_fields(
     """
     scenes = [e.scene for e in experiments]
     objects = [o for s in scenes for o in (*s.solids.values(), *s.cloths.values(), *s.ropes.values())]
+    fitted = {e.name for e in experiments if e.predict is None}
     known: dict[str, Modes] = {o.field.name: o.field for o in objects if o.field is not None}
     over_time = inputs_over_time(experiments)
     known |= {name: next(iter(own.values())) for name, own in over_time.items()}
@@ -132,16 +133,18 @@ def with_fields(
             none = "none, give a cloth or a solid of clusters stiffness_modes, or a rope softness_modes from 1 on"
             fix = f"name one of: {', '.join(known) or none}"
             raise InputError(f"smooth.{name}", "names no field of the scenes", name, fix)
-        private = len(over_time.get(name, ())) > 1
-        own = over_time[name] if private else {}
+        own = over_time.get(name, {})
+        private = len(own) > 1 or not fitted.issuperset(own)  # what is only predicted has its own, too
+        own = own if private else {}
         modes = max(own.values(), key=lambda m: len(m.modes)) if private else known[name]
         if twice := [mode for mode in modes.modes if mode in parameters]:
             fix = "leave them out of the parameters: smooth adds them"
             raise InputError(f"smooth.{name}", "has modes that are parameters already", twice, fix)
         size = wanted.size or FIRST_SIZE * modes.scale
-        fitted = {e.name for e in experiments if e.predict is None}
         own = {recording: modes for recording, modes in own.items() if recording in fitted}
-        fields.append(Field(modes, wanted, size, wanted.length or FIRST_LENGTH * modes.extent, own=own))
+        field = Field(modes, wanted, size, wanted.length or FIRST_LENGTH * modes.extent, own=own)
+        if own or not private:
+            fields.append(field)
         quantities = next(e.scene.quantities for e in experiments if modes.modes[-1] in e.scene.quantities)
         more = [
             Parameter(
@@ -152,7 +155,7 @@ def with_fields(
             )
             for m in modes.modes
         ]
-        parameters = fields[-1].carried(Parameters([*parameters.values(), *more]))
+        parameters = field.carried(Parameters([*parameters.values(), *more]))
     return parameters, tuple(fields)
 
 
