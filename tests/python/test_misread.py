@@ -11,6 +11,7 @@ import sheetbend as sb
 from sheetbend.doubts.contradictions import doubtful
 from sheetbend.doubts.implausible import implausible
 from sheetbend.doubts.misread import _better, misread
+from sheetbend.doubts.other_units import other_units
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.problem import FitProblem
 from sheetbend.statistics.intervals import open_estimate
@@ -161,6 +162,21 @@ def test_a_rope_much_longer_than_its_markers_show_is_named() -> None:
     e = sb.Experiment(scene=scene, recording=recording, markers=[sb.on_particle(k) for k in range(3)], solver=SOLVER)
     (words,) = implausible(FitProblem([e], as_parameters(["rope_EI"], [e])))
     assert words == "`length` of rope is 30 m, 50 times as far as its last marker in still"
+
+
+def test_a_rope_that_whirls_and_a_bob_on_a_thread_are_plausible() -> None:
+    """The mean places of markers that go round lie together, and a bob of 100 g is 200 times as heavy as a thread."""
+    scene = sb.rope(0.5, 8, density=1e-3, EI=1e-7)
+    scene.add_point_mass(8, 0.1, "bob")
+    times, r = np.arange(60) / 60, np.linspace(0.0, 0.5, 9)
+    turn = 4.0 * np.pi * times[:, None]
+    x = np.stack([np.cos(turn) * r, np.sin(turn) * r, 0.0 * turn * r], axis=-1)
+    x[:30, 4] = np.nan
+    recording, places = sb.Recording(positions=x, times=times, name="whirl"), [sb.on_particle(k) for k in range(9)]
+    e = sb.Experiment(scene=scene, recording=recording, markers=places, solver=SOLVER)
+    assert list(other_units(e)) == []
+    (words,) = other_units(replace(e, recording=replace(recording, positions=1e3 * x)))
+    assert "as far apart as placed on rope (1000 is mm told as m)" in words
 
 
 def test_a_mirror_is_told_from_a_rotation() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import sheetbend as sb
 import test_forces_fit as shaken
-from sheetbend.doubts.misread_forces import misread_forces
+from sheetbend.doubts.misread_forces import _of, misread_forces
 from sheetbend.doubts.prediction import Comparison
 from sheetbend.doubts.unexplained import unexplained
 from sheetbend.experiment.wanted import as_parameters
@@ -62,18 +62,27 @@ def test_right_forces_are_not(twin: Twin) -> None:
     assert misread_forces(FitProblem([alone], as_parameters(["rope_EI"], [alone])), np.zeros(1)) == ()
 
 
+def test_a_start_of_the_other_sign_is_none_where_the_fit_explains_the_forces(twin: Twin) -> None:
+    """It was asked whether forces in N, -1 times those of the start, were in N."""
+    (sensor,), x = watched(twin).forces, np.ones((9, 6))
+    assert list(_of(sensor, x, -x, x)) == []
+    assert [words for words in _of(sensor, x, -x, -x) if 'reads = "body"' in words]
+
+
 def test_most_of_the_forces_must_be_left(twin: Twin) -> None:
     found = sb.fit(watched(twin), parameters=shaken.PARAMETERS, **shaken.QUICK)
     (c,) = found.comparisons
     problem = FitProblem([c.experiment], found.parameters)
 
-    def doubts(part: float) -> dict[str, str]:
-        """Where the model reads only a part of how the forces vary."""
+    def doubts(part: float, sigma: float = shaken.FORCE_NOISE) -> dict[str, str]:
+        """Where the model reads only a part of how the forces vary, and where so large an error of them is expected."""
         (one,) = c.forces
         mean = np.nanmean(one.simulated, axis=0)
         less = replace(one, simulated=mean + part * (one.simulated - mean))
-        other: Comparison = replace(c, forces=(less,))
+        e = replace(c.experiment, forces=[replace(c.experiment.forces[0], sigma=sigma)])
+        other: Comparison = replace(c, experiment=e, forces=(less,))
         return unexplained(problem, [other], 1.0)
 
     assert doubts(1.0) == doubts(0.5) == {}
     assert "of the forces of wrist" in doubts(0.1)["rod_EI"]
+    assert doubts(0.1, sigma=2.0 * float(np.nanstd(c.forces[0].measured[:, :3]))) == {}

@@ -47,16 +47,19 @@ def _of(sensor: ForceSensor, measured: Array, begun: Array, ended: Array) -> Ite
         whole = float(y @ y)
         if not whole > 0.0:
             continue
-        missed = float((y - last) @ (y - last)) > MISSED * whole
         times, explains = _multiple(first, y, whole)
-        if missed and times < 0.0 and explains > ALIKE:
+        if explains <= ALIKE:
+            continue
+        if times < 0.0:
+            if float((y - last) @ (y - last)) <= MISSED * whole:
+                continue  # another start
             other = "body" if sensor.reads == "support" else "support"
             yield (
                 f"the {kind} of {sensor.name} are {short(times, 2)} times what the model reads at the values that the "
                 f'fit began with. A sensor that tells what acts on the other side needs reads = "{other}"'
             )
             return
-        if explains > ALIKE and not 1.0 / FAR < times < FAR:
+        if not 1.0 / FAR < times < FAR:
             yield (
                 f"the {kind} of {sensor.name} are {short(times, 2)} times what the model reads at the values that the "
                 f"fit began with. Are they in {unit}?"

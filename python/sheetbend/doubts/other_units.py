@@ -11,7 +11,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..arrays.timeseries import mean_position
 from ..experiment.experiment import Experiment
 from ..quantities.wording import short
 
@@ -22,6 +21,7 @@ APART, NEAR = 3.0, 0.1  # of their distance on the object: how far apart neighbo
 UNSEEN = 5.0  # times the part that markers show: how long a rope is hardly ever
 COARSE = 0.3  # of the extent of all markers: with a larger sigma they tell nothing
 HEAVY = 50.0  # times the mass of all else: what hangs on it hardly ever is
+GRAMS = 1.0  # kg: a bob of 100 g on a thread is that heavy, but one that was weighed in grams is told as 1 or more
 
 
 def other_units(e: Experiment) -> Iterator[str]:
@@ -29,9 +29,8 @@ def other_units(e: Experiment) -> Iterator[str]:
     yield from _hung(e)
     if e.is_cloud:
         return
-    recorded = mean_position(e.recording.positions)
     for name, flat, places in _objects(e):
-        ratio = _ratio(places, recorded[flat])
+        ratio = _ratio(places, e.recording.positions[:, flat])
         if ratio is not None and not NEAR < ratio < APART:
             far = [f"recorded in {e.name}", f"placed on {name}"]
             more, less = far if ratio > 1.0 else far[::-1]
@@ -62,7 +61,7 @@ def _hung(e: Experiment) -> Iterator[str]:
     total = float(np.sum(e.scene.compiled.inputs()[offset : offset + e.scene.particle_count]))
     for name, mass in masses.items():
         rest = total - mass
-        if name not in e.scene.bodies and 0.0 < HEAVY * rest < mass:
+        if name not in e.scene.bodies and mass >= GRAMS and 0.0 < HEAVY * rest < mass:
             times = short(mass / rest, 2)
             yield f"`mass` of {name} is {short(mass)} kg, {times} times all else in the scene. Is it in g?"
 
@@ -93,13 +92,13 @@ def _arcs(e: Experiment, particles: Array, arc_length: Array) -> list[tuple[int,
 
 
 def _ratio(at: Array, recorded: Array) -> float | None:
-    """Distances of neighbors as recorded, over those on the object: the median; None where no marker is seen."""
+    """Distances of neighbors as recorded (frames, k, 3), over those on the object: the median over frames and
+    neighbors; None where no two are seen together."""
     apart = np.linalg.norm(at[:, None] - at[None], axis=2)
     np.fill_diagonal(apart, np.inf)
     apart[apart <= 0.0] = np.inf
     near = apart.argmin(axis=1)
-    here = np.arange(len(at))
-    told = np.linalg.norm(recorded - recorded[near], axis=1) / apart[here, near]
+    told = np.linalg.norm(recorded - recorded[:, near], axis=2) / apart[np.arange(len(at)), near]
     told = told[np.isfinite(told) & (told > 0.0)]
     return float(np.median(told)) if len(told) else None
 

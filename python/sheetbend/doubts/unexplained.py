@@ -10,7 +10,7 @@ to be explained is then the motion beside that of markers which move rigidly wit
 There a shape that is missed counts too, where it spoils the prediction: a model whose error is more than a third of
 that without physics, both in the fitted and in the held-out part, does not move as what was recorded.
 
-Forces and torques of a sensor are asked in the same way, the two apart.
+Forces and torques of a sensor are asked in the same way, the two apart. What is within their sigma is noise.
 """
 
 from __future__ import annotations
@@ -169,8 +169,9 @@ def _hardly_better(c: Comparison, values: Values) -> str:
 
 def _of_forces(c: Comparison) -> Iterator[str]:
     """Why the forces or torques of a sensor count as unexplained."""
-    for one in c.forces:
-        for kind, (_, columns) in zip(("forces", "torques"), UNITS, strict=True):
+    for sensor, one in zip(c.experiment.forces, c.forces, strict=True):
+        told = (sensor.sigma, sensor.torque_sigma or 0.0)
+        for kind, (_, columns), sigma in zip(("forces", "torques"), UNITS, told, strict=True):
             y, x = one.measured[one.fitted][:, columns], one.simulated[one.fitted][:, columns]
             counts = np.isfinite(y).any(axis=0)
             y, x = y[:, counts], x[:, counts]
@@ -178,7 +179,7 @@ def _of_forces(c: Comparison) -> Iterator[str]:
             if len(y) < 3 or not y.size:
                 continue
             left, moved = (float(np.var(each, axis=0).sum()) for each in (y - x, y))
-            noise = white_variance(y[:-2], y[1:-1], y[2:])
+            noise = max(sigma**2 * y.shape[1], white_variance(y[:-2], y[1:-1], y[2:]))
             if left > NOISY * noise and left - noise > MOST * (moved - noise) > 0.0:
                 missed = short(100 * (left - noise) / (moved - noise), 2)
                 yield (
