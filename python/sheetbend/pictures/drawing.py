@@ -46,7 +46,7 @@ def key(parent: Axes | Figure, entries: Sequence[tuple[str, str]]) -> None:
     row = boxes.HPacker(children=words, pad=0, sep=14)
     inside = hasattr(parent, "transAxes")
     coordinates, corner = ("axes fraction", (1, 0)) if inside else ("figure fraction", (1, 1))
-    offset = {"xybox": (0, 4 if inside else -4), "boxcoords": "offset points"}
+    offset = {"xybox": (0, 4) if inside else (-8, -4), "boxcoords": "offset points"}
     parent.add_artist(
         boxes.AnnotationBbox(row, (1, 1), box_alignment=corner, xycoords=coordinates, frameon=False, pad=0, **offset)
     )
