@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from .errors import SheetbendError
+from .errors import InputError, SheetbendError
 from .experiment.experiment import Experiment
 from .experiment.wanted import ParameterLike, as_parameters
 from .fitting.experiments import experiments_of
@@ -60,6 +60,8 @@ def problem(
     """
     pypesto = require("pypesto", "pesto")
     experiments = experiments_of(scene, recording, experiment)
+    if over_time := [e.name for e in experiments if e.scene.over_time]:
+        raise InputError("scene", "has unknown inputs over time", over_time[:5], "use sheetbend.fit")
     wanted = as_parameters(parameters, experiments)
     experiments, expanded = joined(experiments, wanted, threads)
     fitted = [e for e in experiments if e.predict is None]

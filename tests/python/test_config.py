@@ -355,6 +355,12 @@ class TestValues:
         again = load(folder / "fitted.toml")
         assert again.options["windows"] == [] and again.options["threads"] == 2
 
+    def test_a_parameter_that_is_named_like_a_mode_stays_one(self, folder: Path) -> None:
+        force = '\n[[scene.unknown_force]]\nname = "rope"\nrope = "rope"\nscale = 0.01\nspacing = 0.05\n'
+        new = with_values(parse(written(folder, ROPE + force)), {"rope_EI": 3e-3, "rope_x_1": 0.002})
+        assert new.parameters["rope_EI"].initial == 3e-3
+        assert [r.values for r in new.recording] == [{"rope_x_1": 0.002}]
+
     def test_a_value_on_its_bound_stays_inside(self, folder: Path) -> None:
         new = with_values(parse(written(folder, ROPE)), {"rope_EI": 1.0 + 2e-16 * 8})
         assert new.parameters["rope_EI"].initial == 1.0

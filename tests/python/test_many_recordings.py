@@ -136,6 +136,9 @@ def test_it_tells_and_saves_all_recordings(tmp_path: Path) -> None:
     (tmp_path / "many.csv").write_text("\n".join(",".join(row) for row in rows[:-1]))
     with pytest.raises(InputError, match=r"many.csv: is not the table of many.json"):
         sb.ManyFit.load(tmp_path / "many.json")
+    (tmp_path / "many.json").write_text(json.dumps(data | {"format": "sheetbend many 1"}))
+    with pytest.raises(InputError, match=r"format: is not the one.*got 'sheetbend many 1'"):
+        sb.ManyFit.load(tmp_path / "many.json")
 
 
 def test_a_fit_that_was_interrupted_goes_on_with_the_same_bits(tmp_path: Path) -> None:

@@ -132,6 +132,8 @@ def test_what_makes_no_field_is_refused() -> None:
             hung(modes, **more)
     with pytest.raises(sb.SceneError, match=r"rope.softness_modes: must be whole numbers"):
         sb.rope(LENGTH, 20, density=0.05, EI=1e-3, softness_modes=(1, 1))
+    with pytest.raises(sb.SceneError, match=r"rope.softness_modes: need EI"):
+        sb.rope(LENGTH, 20, density=0.05, softness_modes=3)  # type: ignore[arg-type]
     e = seen(np.zeros(1), 0)
     with pytest.raises(sb.InputError, match=r"smooth.rope_softness: names no field.*softness_modes from 1 on"):
         with_fields(as_parameters(["rope_EI"], [e]), [e], {"rope_softness": sb.Smooth()})

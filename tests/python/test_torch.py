@@ -700,6 +700,11 @@ def test_forces_at_a_support_have_the_gradients_of_differences(scene):
 
     start = [torch.tensor(scene.quantities[name].value, dtype=torch.float64, requires_grad=True) for name in names]
     found = read(*start)
+    single = [v.detach().float().requires_grad_() for v in start]
+    rounded = read(*single)
+    rounded.sum().backward()
+    assert rounded.dtype == torch.float32 and torch.allclose(rounded.double(), found, rtol=1e-3, atol=1e-6)
+    assert all(v.grad is not None and v.grad.dtype == torch.float32 and v.grad != 0.0 for v in single)
     plain = sb.simulate_forces(scene, [0.04, 0.06], at, SOLVER, arm=(0.1, 0.0, 0.0))
     assert torch.equal(found.detach(), torch.from_numpy(np.hstack([plain.forces, plain.torques])))
     weights = torch.linspace(-1.0, 1.0, 12, dtype=torch.float64).reshape(2, 6)

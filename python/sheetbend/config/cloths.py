@@ -85,7 +85,8 @@ def build_cloth(
             with located(where):
                 tool.drive(scene, held_there, points)
     if base is not None and section.shape == "placed":
-        base.frame.place(scene, cloth.particles)
+        attached = [p for body in scene.bodies.values() for p in body.attached]
+        base.frame.place(scene, np.setdiff1d(cloth.particles, attached))
     return cloth
 
 

@@ -27,7 +27,7 @@ def with_values(config: Config, values: Mapping[str, float]) -> Config:
     names = [r.name or Path(r.file).stem for r in recordings]
     for name, value in values.items():
         base, _, recording = name.removesuffix("]").partition("[")
-        if any(base.startswith(f"{field}_") for field in fields):  # a mode of a field
+        if base not in parameters and any(base.startswith(f"{field}_") for field in fields):  # a mode of a field
             recordings = [
                 r.model_copy(update={"values": {**r.values, base: value}}) if recording in ("", own) else r
                 for r, own in zip(recordings, names, strict=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -22,7 +24,8 @@ with 0.01, and 40 links of 12.5 mm, double precision lost these rows."""
 def attach(body: Body, particles: ArrayLike, *, name: str | None = None) -> str:
     """Fix particles to a body where they are, such as the edge of a cloth to a pole.
 
-    They start on the body for all values of the quantities of its start, and have their own mass.
+    They start on the body for all values of the quantities of its start, or of the correction of the poses that it
+    rides on, and have their own mass.
 
     Args:
         body: what `Scene.add_body` returned.
@@ -42,17 +45,19 @@ def attach(body: Body, particles: ArrayLike, *, name: str | None = None) -> str:
     check_label("attach.name", group)
     own = scene.node_array(where, particles).tolist()
     taken = {p for b in scene.bodies.values() for p in (*b.particles.tolist(), *b.attached)}
-    bad = sorted({p for p in own if own.count(p) > 1 or p in taken or p in scene.held})
+    bad = sorted(p for p, count in Counter(own).items() if count > 1 or p in taken or p in scene.held)
     if bad:
         fix = "give free particles, each once, that are part of no body and attached to none"
         raise SceneError(where, "cannot fix these particles", bad, fix)
     body.carrying()  # now, for its terms
     origin, frame = body.pose(scene.nodes)
     places = (scene.nodes[own] - origin) @ frame
-    body.attached |= dict(zip(own, places, strict=True))
     p, *axes = body.particles.tolist()
     weights = np.stack([body.coordinates(expressions(x)) for x in places])
     constrain(scene, "coincide_particle", group, [[p, one, *axes] for one in own], weights)
+    body.attached |= dict(zip(own, places, strict=True))
+    if body.correction is not None:
+        body.correction.place(scene, np.array(own))
     return group
 
 

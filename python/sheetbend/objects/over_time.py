@@ -130,8 +130,8 @@ def add_unknown_wind(scene: Scene, *, scale: float, spacing: float, duration: fl
         OverTime, also kept as `scene.over_time[name]`.
 
     Raises:
-        SceneError: the wind changes already, numbers that are not positive, or a spacing that is longer than the
-            motion.
+        SceneError: no triangles in air, the wind changes already, numbers that are not positive, or a spacing that is
+            longer than the motion.
     """
     check_scene(scene)
     found = _over_time(scene, name, "wind", "m/s", scale, spacing, duration)

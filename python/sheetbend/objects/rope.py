@@ -202,7 +202,7 @@ def add_rope(
             f"{name}.plane", "is missing", None, "give the unit normal that the clamp angles or the set turn about"
         )
     check_set(name, set_modes, EI)
-    if EI is None and len(softness_modes):
+    if EI is None and np.size(softness_modes):
         raise SceneError(f"{name}.softness_modes", "need EI", EI, "give EI, or leave them out")
 
     nodes = scene.add_particles(shape, 0.0, speeds)

@@ -134,8 +134,8 @@ class ManyFit:
         path = Path(path)
         with reading(path, InputError):
             data = dict(mapping(json_content(path, InputError, finite=True), str(path)))
-            if data.pop("format", None) != FORMAT:
-                raise InputError(f"{path}: format", "is not the one that this version reads", data, f"use {FORMAT!r}")
+            if (kind := data.pop("format", None)) != FORMAT:
+                raise InputError(f"{path}: format", "is not the one that this version reads", kind, f"use {FORMAT!r}")
             data.pop("table", None)
             own = [as_dataclass(_Distribution, part, f"own[{i}]") for i, part in enumerate(data["own"])]
             count = as_type(int, data["recordings"], "recordings")

@@ -71,8 +71,10 @@ class Air:
         """Take knots (knots,) s at which a wind that is constant so far may change.
 
         Raises:
-            SceneError: it changes already.
+            SceneError: no triangles, or it changes already.
         """
+        if not len(self.triangles):
+            raise SceneError("wind", "blows on nothing", None, "call Scene.add_air first, or give a cloth air_normal")
         if self._blowing is None:
             self._blow(scene, None, None)
         if len(self.times) > 1:

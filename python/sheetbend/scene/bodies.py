@@ -191,6 +191,7 @@ class Path:
 
 def drive_body(scene: HeldScene, body: Body, path: Path, frame: HasCorrection | None) -> None:
     """Let the nodes ride on a path, which a frame may correct."""
+    body.correction = frame
     own = np.stack([body.center, *body.axes.T])  # in the body's frame
     known = numbers(own, body.values())
     motion = np.einsum("tab,kb->tka", path.frames, known)

@@ -94,6 +94,7 @@ class Body:
         role: "free", "pinned" or "driven".
         spin_node: the hidden, pinned node that holds the angular momentum of a body that keeps it, or None.
         attached: particles that are fixed to it, with their places (3,) m in its frame, at which they start.
+        correction: the frame whose quantities correct the poses that it rides on (`HandEye`), or None.
     """
 
     name: str
@@ -105,6 +106,7 @@ class Body:
     role: str = "free"
     spin_node: int | None = None
     attached: dict[int, Array] = field(default_factory=dict, repr=False)
+    correction: Any = field(default=None, repr=False)
     _first: int | None = field(default=None, repr=False)  # of 18 intermediate values, the start as others see it
 
     def carrying(self) -> FrameState:

@@ -64,10 +64,8 @@ class Forces:
     def push(self, particles: list[int], forces: Array, times: ArrayLike) -> None:
         """Add expressions (knots, k, 3) N to the forces on particles, which may be loaded already."""
         t = self._checked(times)
-        new = [p for p in particles if p not in self.particles]
         self.times = t
-        self.particles += new
-        self._values += [np.zeros((len(t), 3)) for _ in new]
+        self._load(particles)
         for factors, coefficients in by_factors(forces).items():
             self._terms += [
                 (particles[k], int(knot), int(axis), float(coefficients[knot, k, axis]), factors)
@@ -99,9 +97,7 @@ class Forces:
         if self.particles:
             self._move_to(every)
         self.times = every
-        new = [p for p in particles if p not in self.particles]
-        self.particles += new
-        self._values += [np.zeros((len(every), 3)) for _ in new]
+        self._load(particles)
         at_knots = at_times(times, every) @ shapes
         parts: dict[Factors, list[tuple[int, float]]] = {}
         for particle, weight in zip(particles, weights, strict=True):
@@ -111,6 +107,13 @@ class Forces:
             nodes, by = [p for p, _ in own], np.array([share for _, share in own])
             for shape, (x, y, z) in zip(at_knots.T, names, strict=True):
                 self._varied.append((nodes, by, shape, (x, y, z), factors))
+
+    def _load(self, particles: list[int]) -> None:
+        """Let forces act on particles, which may be loaded already: zero at the present knots."""
+        known = set(self.particles)
+        new = [p for p in particles if p not in known]
+        self.particles += new
+        self._values += [np.zeros((len(self.times), 3)) for _ in new]
 
     def _move_to(self, times: Array) -> None:
         """Take other knots (knots,), among which are all of those before."""

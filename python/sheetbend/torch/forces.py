@@ -16,7 +16,7 @@ from ..experiment.force_readings import read_at, readings_problem
 from ..motion.core_terms import divergence
 from ..motion.solver import Solver
 from ..scene.scene import Scene
-from .inputs import given_by_name
+from .inputs import dtype_of, given_by_name
 
 
 def forces(
@@ -34,10 +34,11 @@ def forces(
 
     The derivatives are tangents of the rollout, eight to a simulation, so their cost grows with the number of tensors;
     input arrays are not differentiated. Arguments: see `sheetbend.simulate_forces`; of `values`, tensors (each of one
-    number, float64) are differentiated.
+    number) are differentiated.
 
     Returns:
-        (samples, 6), N and N m in the sensor's axes.
+        (samples, 6), N and N m in the sensor's axes. float32 if all tensors given are float32, else float64; everything
+        is computed in float64.
 
     Raises:
         InputError: times, particles, tensors or fields that do not suit.
@@ -46,16 +47,17 @@ def forces(
     given = given_by_name("values", values)
     tensors = {name: value for name, value in given.items() if isinstance(value, Tensor)}
     for name, value in tensors.items():
-        if value.numel() != 1 or value.dtype != torch.float64 or value.device.type != "cpu":
-            got = (tuple(value.shape), str(value.dtype), str(value.device))
-            raise InputError(name, "must be one number, float64, on the CPU", got, "give a tensor of that sort")
+        kinds = (torch.float64, torch.float32)
+        if value.numel() != 1 or value.dtype not in kinds or value.device.type != "cpu":
+            got, wanted = (tuple(value.shape), str(value.dtype), str(value.device)), "float64 or float32, on the CPU"
+            raise InputError(name, f"must be one number, {wanted}", got, "give a tensor of that sort")
     numbers = {name: float(v.detach() if isinstance(v, Tensor) else v) for name, v in given.items()}
     made = read_at(times, at, quaternions, **sensor)
     span = (0.0, float(made.recording.times[-1]))
     problem = readings_problem(made, scene, Solver.given(solver), numbers, list(tensors), start, span)
-    scalars = (t.reshape(()) for t in tensors.values())
+    scalars = (t.reshape(()).double() for t in tensors.values())
     read: Tensor = _Readings.apply(problem, scene, *scalars)  # type: ignore[no-untyped-call]
-    return read
+    return read.to(dtype_of(tensors, {}))
 
 
 class _Readings(torch.autograd.Function):
