@@ -237,7 +237,9 @@ def test_each_recording_has_a_force_of_its_own() -> None:
 def test_a_bootstrap_has_no_doubt_of_modes() -> None:
     """A draw without the stretches in which a force acts tells nothing of it: twelve modes were named."""
     prior = {"push": sb.Smooth(size=0.02, length=0.08)}
-    fit = sb.fit([seen(6, "first")[0], seen(7, "second")[0]], parameters=["rope_EI"], smooth=prior, bootstrap=50, **ALONE)
+    fit = sb.fit(
+        [seen(6, "first")[0], seen(7, "second")[0]], parameters=["rope_EI"], smooth=prior, bootstrap=50, **ALONE
+    )
     assert fit.result.bootstrap is not None and not any("push" in words for words in fit.result.warnings)
 
 

@@ -13,6 +13,7 @@ from ..minimum.growth import Growth
 from ..minimum.linear_step import gauss_newton
 from ..minimum.problem import FitProblem
 from ..minimum.progress import Minimum
+from ..minimum.smooth import modes_over_time
 from ..quantities.parameters import Parameters
 from ..quantities.wording import short
 from ..result.estimate import UNSOUND, Estimate
@@ -91,7 +92,7 @@ def judged_parameters(
         limits=impossible_ahead(problem, u, r, J),
         fixes=_beyond_scenes(problem),
         bodies=bodies_of(problem, u),
-        linear_ones=_of_inputs(problem),
+        linear_ones=of_inputs(problem),
     )
     return judged, () if profiles is None else tuple(profiles.lower)
 
@@ -103,9 +104,9 @@ def impossible_ahead(problem: FitProblem, u: Array, r: Array, J: Array) -> dict[
     return coordinates.beyond(gauss_newton(problem.parameters, u, J, r)) if coordinates.charts else {}
 
 
-def _of_inputs(problem: FitProblem) -> set[str]:
+def of_inputs(problem: FitProblem) -> set[str]:
     """The parameters that make up unknown inputs over time, on which motions depend almost linearly."""
-    modes = {mode for e in problem.experiments for own in e.scene.over_time.values() for mode in own.modes}
+    modes = modes_over_time(problem.experiments)
     return {name for name in problem.parameters.free if name.partition("[")[0] in modes}
 
 

@@ -14,6 +14,7 @@ from ..experiment.driven_motion import continued
 from ..experiment.experiment import Experiment
 from ..minimum.optimizers import refit
 from ..minimum.problem import FitProblem
+from ..minimum.smooth import modes_over_time
 from ..quantities.parameters import Parameters
 from ..recording.baseline import baseline
 from ..recording.oscillation import along, dominant_direction, first_frequency
@@ -113,7 +114,7 @@ def predicted_values(
         if e.predict is None:
             continue
         private = [p for p in wanted.values() if p.private and p.tied_to is None and p.name in e.scene.quantities]
-        unknown = {mode for own in e.scene.over_time.values() for mode in own.modes}
+        unknown = modes_over_time([e])
         if e.predict == "mean" or refitter is None:
             words = "mean of the fitted recordings"
             for p in private:

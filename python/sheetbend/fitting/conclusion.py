@@ -11,7 +11,7 @@ import numpy as np
 from ..doubts.beginnings import of_beginnings
 from ..doubts.beyond_bounds import beyond_bounds
 from ..doubts.bootstrap import bootstrap, wider
-from ..doubts.conclude import judged_parameters
+from ..doubts.conclude import judged_parameters, of_inputs
 from ..doubts.contradictions import between_parts, together
 from ..doubts.floors import at_floor_of_sweeps
 from ..doubts.given import half_widths, premises
@@ -119,7 +119,9 @@ def conclude(
     drawn: Bootstrap | None = None
     if asked.bootstrap and refitter is not None and not lost:
         drawn, why = bootstrap(problem, best.u, asked.bootstrap, judged.autocorrelation_time)
-        warnings += (why,) if drawn is None else wider(drawn, judged.estimates)
+        modes = of_inputs(problem)  # a draw without the stretches of an input leaves it to its prior
+        told_of = [e for e in judged.estimates if e.name not in modes]
+        warnings += (why,) if drawn is None else wider(drawn, told_of)
     if silent:
         ignored = IGNORED if asked.given else ""
         warnings += (f"what errors of the given values would move is not known{ignored}: {silent}",)

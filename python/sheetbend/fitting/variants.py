@@ -10,6 +10,7 @@ import numpy as np
 
 from ..experiment.experiment import Experiment
 from ..experiment.force_sensor import ForceSensor
+from ..minimum.smooth import modes_over_time
 from ..objects.markers import Place, on_rope
 from ..quantities.parameters import Parameters
 from ..recording.force_recording import ForceRecording
@@ -45,7 +46,7 @@ def changes(experiments: Sequence[Experiment], free: Parameters, wanted: Paramet
 
 def _apart(experiments: Sequence[Experiment], wanted: Parameters) -> Parameters:
     """The parameters, those of unknown inputs over time private: each recording has its own."""
-    modes = {mode for e in experiments for own in e.scene.over_time.values() for mode in own.modes}
+    modes = modes_over_time(experiments)
     return Parameters(replace(p, private=True) if p.name in modes else p for p in wanted.values()) if modes else wanted
 
 

@@ -69,10 +69,10 @@ class Fields:
             return ()
         found = []
         for i, field in enumerate(self._fields):
-            if not isinstance(field.modes, OverTime):
-                continue
             begin = 0
             for recording, (modes, names) in zip(self._recordings(field), field.each, strict=True):
+                if not isinstance(modes, OverTime):
+                    continue
                 own = self._picture.columns[i][begin : begin + len(names)]
                 begin += len(names)
                 half, left, _ = spread(self._picture, self._fields, i, None, (modes, own))
@@ -95,7 +95,7 @@ class Fields:
     def _recordings(self, field: Field) -> list[str]:
         """Of each modes of a field; of those that are shared, the first that has them."""
         name = field.modes.modes[0]
-        return list(field.own) or [next(e.name for e in self._problem.experiments if name in e.scene.quantities)]
+        return list(field.own) or [next((e.name for e in self._problem.experiments if name in e.scene.quantities), "")]
 
 
 def _prior(field: Field) -> dict[str, Any]:

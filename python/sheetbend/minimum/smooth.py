@@ -184,6 +184,11 @@ def inputs_over_time(experiments: Sequence[Experiment]) -> dict[str, dict[str, O
     return found
 
 
+def modes_over_time(experiments: Sequence[Experiment]) -> set[str]:
+    """The quantities that make up the unknown inputs over time of the experiments' scenes."""
+    return {mode for e in experiments for own in e.scene.over_time.values() for mode in own.modes}
+
+
 def settled(
     experiments: Sequence[Experiment],
     wanted: Parameters,
