@@ -284,6 +284,25 @@ def test_a_header_of_several_rows(tmp_path: Path, header: str) -> None:
     assert np.allclose(got.positions, 1e-3 * X, rtol=0, atol=1e-15)
 
 
+@pytest.mark.parametrize("header", ["Time (s);a_x;a_y;a_z\nms;mm;mm;mm", "Time;a_x [mm];a_y [mm];a_z [mm]\ns;m;m;m"])
+def test_units_that_contradict_the_header_are_refused(tmp_path: Path, header: str) -> None:
+    """The row below was passed over, and times in ms were taken as s."""
+    (tmp_path / "take.csv").write_text(f"{header}\n0;1;2;3\n10;1;2;3\n")
+    with pytest.raises(RecordingError, match="line 2: holds a cell that is no number"):
+        Recording.load(tmp_path / "take.csv")
+    same = header.replace("\nms", "\ns").replace("s;m;m;m", "s;mm;mm;mm")
+    (tmp_path / "take.csv").write_text(f"{same}\n0;1;2;3\n10;1;2;3\n")
+    got = Recording.load(tmp_path / "take.csv")
+    assert got.times.tolist() == [0.0, 10.0] and got.positions[0, 0] == pytest.approx([1e-3, 2e-3, 3e-3])
+
+
+@pytest.mark.parametrize("micro", ["u", "\N{MICRO SIGN}", "\N{GREEK SMALL LETTER MU}"])
+def test_microseconds(tmp_path: Path, micro: str) -> None:
+    """Those of the Greek letter were taken as seconds."""
+    (tmp_path / "take.csv").write_text(f"Time [{micro}s],a_x,a_y,a_z\n0,1,2,3\n10000,1,2,3\n", encoding="utf-8")
+    assert Recording.load(tmp_path / "take.csv").times.tolist() == [0.0, 0.01]
+
+
 def test_axes_without_names_are_refused(tmp_path: Path) -> None:
     """Two markers whose names nothing tells, and a title that begins like a header."""
     (tmp_path / "take.csv").write_text("t;x;y;z;x;y;z\n0;1;2;3;4;5;6\n")

@@ -30,7 +30,7 @@ def unit(name: str) -> str | None:
     if match is None:
         return None
     told = "ns" if match[1] else (match[2] or "s").lower()
-    told = "ms" if told.startswith(("msec", "milli")) else "us" if told == "µs" else told
+    told = "ms" if told.startswith(("msec", "milli")) else "us" if told in ("µs", "μs") else told  # micro sign, mu
     return told if told in PER_SECOND else "s"
 
 

@@ -87,7 +87,7 @@ def _rows(path: Path, text: list[tuple[int, str]]) -> list[Row]:
     if not kept:
         fix = "start with a header, time,<marker>_x,..."
         raise RecordingError(str(path), "holds no header", "only blank lines and comments", fix)
-    top = heading.first(kept, lambda line: _begins(path, line))
+    top = heading.first(kept, _begins)
     delimiter = _delimiter(path, *kept[top])
     over = [(number, split(path, number, line, delimiter)) for number, line in kept[max(0, top - 1) : top]]
     rows = [(number, split(path, number, line, delimiter)) for number, line in kept[top:]]
@@ -111,7 +111,7 @@ def _before_time(header: list[str]) -> bool:
     return _FRAME.fullmatch(header[0]) is not None and clock.unit(header[1]) is not None
 
 
-def _begins(path: Path, line: str) -> int:
+def _begins(line: str) -> int:
     """How many cells of a line are filled if it begins with a time, or with a frame before one; else 0."""
     for delimiter in _DELIMITERS:
         cells = [cell.strip() for cell in line.split(delimiter)]

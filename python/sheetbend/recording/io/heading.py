@@ -39,13 +39,14 @@ def first(rows: Sequence[tuple[int, str]], begins: Callable[[str], int]) -> int:
 
 
 def whole(above: Row | None, rows: list[Row]) -> list[Row]:
-    """The rows with one header, that has the markers' names of the row above it and the units of the row below."""
+    """The rows with one header, that has the markers' names of the row above it and the units of the row
+    below. Units that contradict it are left below, where they are no numbers."""
     (line, header), *below = rows
     if above is not None:
         header = _with_names(above[1], header)
     if below:
         units = _units(below[0][1])
-        if units is not None and len(units) == len(header):
+        if units is not None and len(units) == len(header) and all(map(_agree, header, units)):
             header = [_with_unit(name, own) for name, own in zip(header, units, strict=True)]
             below = below[1:]
     return [(line, header), *below]
@@ -61,6 +62,14 @@ def _with_names(above: list[str], header: list[str]) -> list[str]:
     if not all(names) or any(above[k + i] not in ("", above[k]) for k in markers for i in (1, 2)):
         return header
     return [header[0], *(f"{names[k // 3]} {name}" for k, name in enumerate(header[1:]))]
+
+
+def _agree(name: str, own: str) -> bool:
+    """Whether the name of a column has no unit, or that which stands below it."""
+    told = columns.without_unit(name)[1]
+    if clock.unit(name) is not None and clock.unit(f"{name} [{own}]") is None:
+        told = clock.unit(name)
+    return not own or told is None or told == own
 
 
 def _with_unit(name: str, own: str) -> str:
