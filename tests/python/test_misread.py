@@ -179,6 +179,17 @@ def test_a_rope_that_whirls_and_a_bob_on_a_thread_are_plausible() -> None:
     assert "as far apart as placed on rope (1000 is mm told as m)" in words
 
 
+def test_one_marker_at_rest_has_no_extent_to_compare_sigma_with() -> None:
+    """The tip of a cantilever tells its stiffness, however little it moves between frames."""
+    still = sb.equilibrium(rope()).positions[None, 8:] + 1e-5 * np.arange(3)[:, None, None]
+    recording = sb.Recording(positions=still, times=[0.0, 0.1, 0.2], name="tip")
+    e = sb.Experiment(
+        scene=rope(), recording=recording, markers=[sb.on_particle(8)], solver=SOLVER, sigma=SIGMA, static=True
+    )
+    assert list(other_units(e)) == []
+    assert ["`sigma` of" in words for words in other_units(replace(e, static=False))] == [True]
+
+
 def test_a_mirror_is_told_from_a_rotation() -> None:
     rng = np.random.default_rng(0)
     x, seen = rng.standard_normal((20, 4, 3)), np.ones((20, 4), dtype=bool)

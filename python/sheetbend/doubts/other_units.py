@@ -47,7 +47,8 @@ def other_units(e: Experiment) -> Iterator[str]:
             )
     seen = e.recording.positions[:, list(e.compared)]
     extent = float(np.linalg.norm(np.nanmax(seen, axis=(0, 1)) - np.nanmin(seen, axis=(0, 1))))
-    if 0.0 < COARSE * extent < e.sigma:
+    alone = e.static and len(e.compared) == 1  # the place of one marker at rest may tell what its extent does not
+    if not alone and 0.0 < COARSE * extent < e.sigma:
         yield (
             f"`sigma` of {e.name} is {short(e.sigma)} m, and its markers stay within {short(extent, 2)} m: they then "
             f"tell nothing. Told in mm, it would be {short(1e-3 * e.sigma)}"
