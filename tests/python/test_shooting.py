@@ -11,6 +11,8 @@ import sheetbend as sb
 from sheetbend.config import load
 from sheetbend.doubts.missing_loss import missing_loss
 from sheetbend.doubts.other_losses import other_losses
+from sheetbend.doubts.told import told_numbers
+from sheetbend.doubts.wrong_given import wrong_given
 from sheetbend.experiment.cut import borders
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.continuity import joined, with_window
@@ -213,6 +215,14 @@ def test_kicks_that_the_model_does_not_know_are_what_it_loses() -> None:
     e = soft["arm_hinge_viscosity"]
     assert e.lower is not None and e.upper is not None and e.lower < 2e-4 < e.upper
     assert hard.result.recordings[0].rms > 3 * soft.result.recordings[0].rms  # type: ignore[operator]
+
+
+def test_given_numbers_are_not_asked_for_what_a_shot_motion_leaves() -> None:
+    """The fit of a motion that leaves much ended in an AttributeError."""
+    problem = cut(swing(), 1e-3)
+    u = problem.parameters.initial()
+    told, _ = told_numbers(problem, u)
+    assert told and wrong_given(problem, u, told) == []
 
 
 def test_states_beside_the_parameters_have_the_derivatives_that_follow_from_them() -> None:

@@ -37,7 +37,8 @@ def save_scene(scene: Scene, path: str | Path) -> None:
     """Write a scene to one file, from which `load_scene` makes a scene with the same bits of motion and gradient.
 
     Ropes, cloths, bodies and meshes that built the scene (`Scene.ropes`, `Scene.cloths`, `Scene.bodies`) are not in it:
-    places of markers on them must be given as `Place`s.
+    places of markers on them must be given as `Place`s. Fields and unknown inputs over time become plain quantities,
+    one for each mode, which a fit of the loaded scene gives no prior.
 
     Args:
         scene: is frozen by this.
