@@ -299,6 +299,10 @@ def test_a_cloth_and_particles_with_drag_are_attached_to_a_body(tmp_path: Path) 
     motion = sb.simulate(scene, [0.0, 0.2], sb.Solver(h=1e-3), {"hinge_rate": 2.0})
     rate = scene.bodies["pole"].angular_velocity(motion)[1, 0]
     assert rate == pytest.approx(2.0 / (1.0 + 2.0 * 0.2 * 1e-3 / moment), rel=2e-3)
-    (tmp_path / "wrong.toml").write_text(ON_A_BODY.replace('body = "pole"', 'body = "none"'))
-    with pytest.raises(sb.ConfigError, match="no body of the scene"):
-        scene_alone(parse(tmp_path / "wrong.toml"))
+    for old, new, words in (
+        ('body = "pole"', 'body = "none"', "no body of the scene"),
+        ("drag = 1e-3", "pinned = true", r"^scene.particles\[0\].particles: cannot fix these"),
+    ):
+        (tmp_path / "wrong.toml").write_text(ON_A_BODY.replace(old, new))
+        with pytest.raises(sb.ConfigError, match=words):
+            scene_alone(parse(tmp_path / "wrong.toml"))

@@ -302,7 +302,7 @@ def test_what_makes_no_input_is_refused() -> None:
     with pytest.raises(sb.SceneError, match=r"push.particles: are a rope of another scene"):
         sb.add_unknown_force(scene, hung().ropes["rope"], **PUSH)
     assert not scene.over_time and not any(name.startswith("push") for name in scene.quantities)
-    with pytest.raises(sb.SceneError, match=r"add_unknown_force.name: is taken"):
+    with pytest.raises(sb.SceneError, match=r"push.name: is taken"):
         sb.add_unknown_force(hung(), [2], **PUSH)
     frozen = hung()
     assert frozen.compiled
@@ -360,6 +360,10 @@ def test_a_configuration_fits_a_force(tmp_path: Path) -> None:
     assert {"swing_push.png", "report.html", "fitted.toml"} <= {file.name for file in (tmp_path / "out").iterdir()}
     again = sb.FitResult.load(tmp_path / "out" / "fit.json").over_time[0]
     assert np.array(again.values) == pytest.approx(np.array(found.values), abs=0.1 * np.median(found.half_widths))
+    twice = config | {"scene": config["scene"] | {"unknown_force": [push, push]}}
+    (tmp_path / "twice.toml").write_text(tomli_w.dumps(twice))
+    with pytest.raises(sb.ConfigError, match=r"^scene.unknown_force\[1\].name: is taken"):
+        load(tmp_path / "twice.toml")
     for changes, words in (
         ({"rope": "rope"}, "must act on one of particles, rope and body"),
         ({"particles": ["rope:77"]}, r"scene.unknown_force\[0\].particles"),

@@ -75,7 +75,7 @@ def build_cloth(
         where, held_there = f"{path}.grip[{i}]", cloth.particles[vertices]
         if grip.body is not None:
             body = named_body(f"{where}.body", grip.body, scene)
-            with located(where):
+            with located(where, "attach"):
                 attach(body, held_there, name=f"{section.name}_{grip.set}_on_{grip.body}")
         elif grip.tool is None:
             _drive(scene, where, grip, moment, held_there, shape[vertices])

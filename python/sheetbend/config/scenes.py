@@ -155,7 +155,7 @@ def _add_particles(scene: Scene, particles: Particles, section: schema.SceneSect
                 add_air_drag(scene, added, f"{some.name}_drag", some.drag, "N s^2/m^2")
         if some.body is not None:
             body = named_body(f"{path}.body", some.body, scene)
-            with located(path):
+            with located(path, "attach"):
                 attach(body, added, name=f"{some.name}_on_{some.body}")
         particles.add(some.name, added.tolist())
 

@@ -158,7 +158,7 @@ def _over_time(
     scene.add_terms(())  # refuses a frozen scene
     check_label(f"add_unknown_{kind}.name", name)
     if name in scene.over_time:
-        raise SceneError(f"add_unknown_{kind}.name", "is taken by another one", name, "give each a name of its own")
+        raise SceneError(f"{name}.name", "is taken by another one", name, "give each a name of its own")
     fixes = {"scale": f"give an order of magnitude in {unit}", "spacing": "give s", "duration": "give s"}
     for field, value in (("scale", scale), ("spacing", spacing), ("duration", duration)):
         if not (is_number(value) and value > 0):
