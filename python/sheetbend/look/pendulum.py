@@ -12,6 +12,7 @@ import numpy as np
 from ..arrays.smoothing import smoothed
 from ..arrays.timeseries import default_max_gap, interpolate
 from ..errors import RecordingError
+from ..statistics.white_noise import white_variance
 from .seen import RIGID, Seen
 from .swing import Moments, Swing, moments
 from .take import Description, Measured, Take
@@ -21,6 +22,7 @@ Array = np.ndarray
 Piece = tuple[dict[str, Any], float]
 """Keys of a recording that is a part of one, and when it begins."""
 SEEN_ASKEW = 0.02  # the same of three arms, which a rope is told from by how it bends
+CHANCE = 6.0  # standard deviations of two estimates of the same noise, times the root of the number of frames
 ASKEW = 2e-3  # of an arm, by which its length changes beyond noise, from which on the view is not square
 FLAT, STRAIGHT = 0.02, 0.01  # of an arm: how far it may leave its plane, and how much its length may change
 BENDS = 0.6  # of l theta^2/24, by which a line gets shorter where it turns, from which on it is a rope: those 1 to 2
@@ -58,7 +60,7 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     ]
     if len(arms) > 1:
         unknown.append("how the arms that hang share a mass at their hinges: it moves like a part of either one")
-    apart = max(_change(s, a, b) for a, b in pairwise(joints))
+    apart = max(_drift(s, a, b) for a, b in pairwise(joints))
     if apart > ASKEW:
         unknown.append(
             f"where the camera is: the arms seem to change their lengths by {100 * apart:.1g} % (1 sd). Its view is "
@@ -161,6 +163,18 @@ def _change(s: Seen, a: int, b: int) -> float:
     by_noise = math.sqrt(2.0) * s.noise
     spread = float(np.nanstd(_distance(s.recording.positions, a, b)))
     return math.sqrt(max(spread**2 - by_noise**2, 0.0)) / float(s.apart[a, b])
+
+
+def _drift(s: Seen, a: int, b: int) -> float:
+    """How much the distance of two markers changes, relative to it, beyond what its own noise makes by chance."""
+    distance = _distance(s.recording.positions, a, b)
+    before, here, after = distance[:-2], distance[1:-1], distance[2:]
+    seen = np.isfinite(before + here + after)
+    if not seen.any():
+        return 0.0
+    noise = white_variance(before[seen], here[seen], after[seen])
+    by_chance = CHANCE / math.sqrt(np.isfinite(distance).sum())
+    return math.sqrt(max(float(np.nanvar(distance)) - (1.0 + by_chance) * noise, 0.0)) / float(s.apart[a, b])
 
 
 def _bends(x: Array) -> bool:
