@@ -178,9 +178,10 @@ def test_balls_are_kept_in_files_with_the_same_bits(tmp_path: Path):
         assert (tmp_path / "b.scene").read_bytes() == (tmp_path / "a.scene").read_bytes()
 
 
-def test_balls_that_start_inside_each_other_are_refused():
+@pytest.mark.parametrize("axis", range(3))
+def test_balls_that_start_inside_each_other_are_refused(axis: int):
     scene = sb.Scene("balls")
-    scene.add_particles([[0, 0, 0], [0.4, 0, 0], [0.09, 0, 0]], 0.1)
+    scene.add_particles(np.outer([0.0, 0.4, 0.09], np.eye(3)[axis]), 0.1)
     scene.add_collisions([0, 1, 2], radius=0.05, restitution=1.0)
     with pytest.raises(sb.SceneError, match=r"particle 0 and particle 2 are 0\.01 m too near") as error:
         _ = scene.compiled

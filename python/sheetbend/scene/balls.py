@@ -50,8 +50,9 @@ class Balls:
             radii: (n,) m.
             name_of: a particle, in words.
         """
-        order = np.argsort(places[:, 0], kind="stable")
-        along = places[order, 0]
+        axis = int(np.argmax(np.ptp(places, axis=0)))  # along which they are spread the most
+        order = np.argsort(places[:, axis], kind="stable")
+        along = places[order, axis]
         reach = np.searchsorted(along, along + 2 * radii.max(), side="right")  # the last that may be near
         too_near, worst, deepest = 0, (0, 0), TOUCHES
         for k, one in enumerate(order):
