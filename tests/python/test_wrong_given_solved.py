@@ -61,10 +61,10 @@ def test_a_missing_drag_beside_an_estimated_start_is_named() -> None:
     assert any("it had a drag_linear of 0." in w for w in result.warnings), result.warnings
 
 
-def test_the_right_model_beside_an_estimated_start_has_no_warning() -> None:
-    for seed in (0, 1):
-        result = fitted(middle(rope(), seed))
-        assert result.warnings == () and wrong_and_identified(result) == []
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
+def test_the_right_model_beside_an_estimated_start_has_no_warning(seed: int) -> None:
+    result = fitted(middle(rope(), seed))
+    assert result.warnings == () and wrong_and_identified(result) == []
 
 
 def test_told_numbers_change_the_motion_that_starts_where_the_fit_found_it() -> None:

@@ -62,7 +62,7 @@ def _of(sensor: ForceSensor, measured: Array, begun: Array, ended: Array) -> Ite
         if not 1.0 / FAR < times < FAR:
             yield (
                 f"the {kind} of {sensor.name} are {short(times, 2)} times what the model reads at the values that the "
-                f"fit began with. Are they in {unit}?"
+                f"fit began with. Either it began far off, or they are not in {unit}"
             )
 
 
