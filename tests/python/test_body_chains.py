@@ -10,6 +10,7 @@ import sheetbend as sb
 import sheetbend.torch as st
 import torch
 from scipy.spatial.transform import Rotation
+from sheetbend.config import build, parse
 from test_scene_file import altered
 
 SIDE = 0.1  # m, of a body along the chain
@@ -156,3 +157,17 @@ def test_what_cannot_be_attached_is_refused() -> None:
     sb.attach(pole, [free], name="again")  # which the call that was refused has not attached
     with pytest.raises(sb.SceneError, match="is no body"):
         sb.attach(scene, [1])  # type: ignore[arg-type]
+
+
+def test_two_hinged_bodies_explain_a_recorded_double_pendulum() -> None:
+    """The last fitted piece of experiments/double_pendulum_bodies, at what its fit found of both bodies."""
+    folder = Path(__file__).resolve().parents[2] / "experiments" / "double_pendulum_bodies"
+    every = build(parse(folder / f"{folder.name}.toml"), folder).experiments
+    (e,) = (e for e in every if e.name == "fitted_56s")
+    found = {"upper_center_x": 0.12663, "lower_center_x": 0.12286, "lower_inertia_2": 1.2386e-3, "air_drag": 1.023e-3}
+    found |= {"lower_inertia_3": 1.23855e-3, "top_friction": 4.89e-4, "elbow_friction": 1.81e-4}
+    found |= {"upper_zero": 6.9e-5, "lower_zero": -8.5e-5}
+    start = {"top_angle": 0.09391, "elbow_angle": -0.0114, "top_rate": -1.6372, "elbow_rate": -0.215}
+    wanted = {name: {"initial": value, "fixed": name in found} for name, value in (found | start).items()}
+    fit = sb.fit(e, parameters=wanted, refine=False, profiles=False, beginnings=False)
+    assert fit.result.recordings[0].rms == pytest.approx(6.83e-5, rel=0.01)  # m
