@@ -11,11 +11,13 @@ import sheetbend.doubts.beginnings as behind
 from pytest import approx
 from sheetbend.doubts.beginnings import beginnings, checked
 from sheetbend.experiment.wanted import as_parameters
+from sheetbend.fitting import reached
+from sheetbend.minimum.approach import Approach
 from sheetbend.minimum.growth import growths
 from sheetbend.minimum.optimizers import minimize
 from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.progress import Minimum
-from sheetbend.minimum.search import Search
+from sheetbend.minimum.search import Found, Search
 from sheetbend.objects.arm import add_arm
 
 SOLVER = sb.Solver(h=1 / 400)
@@ -123,6 +125,58 @@ def test_a_fit_can_do_without_them(monkeypatch: pytest.MonkeyPatch) -> None:
     found = sb.fit(e, **given, beginnings=False)
     assert not any("s alone ask for" in p.words for p in found.result.estimates)
     assert "s alone ask for" in sb.fit(e, **given)["rope_EI"].words
+
+
+def test_of_many_unknowns_they_are_asked_before_the_last_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a wrong minimum of a cloth they were more than 40. Each beginning is fitted once, and after the beginnings
+    there are two searches: from them, and from the lower end."""
+    e = rope(0.005, 1.5, {"drag_linear": 0.01})
+    given = {"parameters": ["rope_EI", "rope_drag_linear"], "profiles": False, "refine": False}
+    plain = sb.fit(e, **given)
+    searched: list[float] = []
+    fitted: list[float] = []
+    run, onward, alone = Search.run, Search.onward, behind.fitted_window
+
+    def running(search: Search, problem: FitProblem) -> Found:
+        searched.append(search.tolerance)
+        return run(search, problem)
+
+    def going_on(search: Search, problem: FitProblem, u: np.ndarray) -> Minimum:
+        searched.append(search.tolerance)
+        return onward(search, problem, u)
+
+    def window(part: FitProblem, u: np.ndarray, tolerance: float) -> Approach:
+        fitted.append(max(float(r.times[-1]) for r in part.recordings))
+        return alone(part, u, tolerance)
+
+    monkeypatch.setattr(behind, "MANY", 2)
+    monkeypatch.setattr(Search, "run", running)
+    monkeypatch.setattr(Search, "onward", going_on)
+    monkeypatch.setattr(behind, "fitted_window", window)
+    found = sb.fit(e, **given)
+    assert searched == [1e-3, 1e-3, 1e-10]  # first, from the beginnings, and from the lower of both ends
+    assert len(fitted) >= 2 and len(fitted) == len(set(fitted))
+    assert found.result.cost == approx(plain.result.cost, rel=1e-8)
+    assert found["rope_EI"].value == approx(plain["rope_EI"].value, abs=1e-2 * plain["rope_EI"].half_width)
+    searched.clear()
+    short = sb.fit(e, **given, max_iterations=1)
+    assert searched[-1] == 1e-3 and not short.result.starts[0].converged  # no iteration is left
+    searched.clear()
+    sb.fit(e, **given, starts=[{"rope_EI": 3e-3}])
+    assert set(searched) == {1e-10}  # ends that are compared are minima
+
+
+def test_an_interrupted_last_search_leaves_an_end_that_is_no_minimum(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Steps that take little off are no convergence by the tolerance that was asked for."""
+    e = rope(0.01, 1.5, {"drag_linear": 0.005, "bend_damping": 0.01})
+
+    def stopped(*_: object) -> Minimum:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(behind, "MANY", 2)
+    monkeypatch.setattr(reached, "_followed", stopped)
+    result = sb.fit(e, parameters=["rope_EI", "rope_drag_linear"], profiles=False, refine=False).result
+    assert result.interrupted and not result.starts[0].converged
 
 
 def test_a_right_model_is_not_contradicted_by_its_beginnings() -> None:

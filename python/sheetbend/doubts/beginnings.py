@@ -11,7 +11,8 @@ the other stretches would move in it counts in the comparison, as far as the giv
 (`stretches`).
 
 Nothing is done where the residuals are white and as large as the given sigma, but for motions with many unknowns of
-their own: these explain nearly all of a motion in a wrong minimum, too.
+their own: these explain nearly all of a motion in a wrong minimum, too. Each beginning is fitted once from the end of
+the first search, and where the search from there ends lower by `LOWER`, once more from that end; there it stops.
 """
 
 from __future__ import annotations
@@ -122,7 +123,7 @@ def checked(
     """
     found = beginnings(problem, ends[0], growths)
     whole = Whole(problem, ends[0].u)
-    lower = _many(problem) and any(_leaves_more(b, LEVEL / len(found)) for b in found)
+    lower = many(problem) and any(_leaves_more(b, LEVEL / len(found)) for b in found)
     if not lower and not any(_differences(whole, b, LEVEL / len(found)) for b in found):
         return tuple(ends), found
     try:
@@ -140,7 +141,7 @@ def beginnings(problem: FitProblem, end: Minimum, growths: Sequence[Growth]) -> 
     if not end.converged or problem.estimates_corrections:
         return ()
     ok, r, _ = problem.evaluate(end.u)
-    if not ok or not (_systematic(problem, r) or _many(problem)):
+    if not ok or not (_systematic(problem, r) or many(problem)):
         return ()
     at, u, found = _times(problem), end.u, []
     for length in chosen(problem, growths):
@@ -192,7 +193,7 @@ def _asked(whole: Whole, judged: Identifiability, found: Sequence[Beginning], re
     return drawn_along(judged, words)
 
 
-def _many(problem: FitProblem) -> bool:
+def many(problem: FitProblem) -> bool:
     """Whether a motion has so many unknowns that residuals as large as noise do not tell a right minimum."""
     return any(len(problem.acting_on(e)) >= MANY for e in problem.experiments if not e.static)
 
