@@ -118,6 +118,7 @@ class ParameterMap {
       product_.push_back(static_cast<int>(term_.size()) - 1);
       if (terms_.target[t] < 0) makes_.push_back(t);
     }
+    intermediates_ = terms_.intermediates();
   }
 
   const ParameterTerms& terms() const { return terms_; }
@@ -169,7 +170,7 @@ class ParameterMap {
 
   template <class T>
   Known<T> known_with(const T* theta) const {
-    Known<T> known{theta, std::vector<T>(terms_.intermediates(), T(0.0))};
+    Known<T> known{theta, std::vector<T>(intermediates_, T(0.0))};
     for (const std::size_t t : makes_)
       known.intermediate[-1 - terms_.target[t]] += terms_.coefficient[t] * product_without(known, t, -1);
     return known;
@@ -196,6 +197,7 @@ class ParameterMap {
   std::vector<int> product_;        // per term
   std::vector<std::size_t> term_;   // per product, the first that has it
   std::vector<std::size_t> makes_;  // the terms of intermediate values
+  int intermediates_ = 0;
 };
 
 }  // namespace sheetbend

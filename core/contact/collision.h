@@ -35,7 +35,7 @@ struct BallPair {
 };
 
 // Balls that overlap and approach should have met before: at the time, some substeps ago at most, to which their paths lead back. This moves them apart.
-inline constexpr double longest_overdue = 32.0;
+inline constexpr double longest_overdue = 32.0;  // substeps
 
 // When two balls meet, since the later of their flights began. Not `dated`: at once, whatever moves them, for their paths lead back to no such time.
 struct BallMeeting {
@@ -44,13 +44,13 @@ struct BallMeeting {
   bool rests;  // too slow to bounce: they go on together
 };
 
-// From the start of the later flight on.
+// From the start of the later flight on. Flights that began at the same instant are cut too: the derivatives of their starts may differ.
 template <class S>
 struct Together {
   Flight<S> one, other, apart;  // and the first one relative to the second
   Together(bool curved, const BallPair<S>& p) : one(p.one.flight), other(p.other.flight) {
     const auto cut = [&](Flight<S>& f, const S& left) {
-      if (!(value_of(f.left) > value_of(left))) return;
+      if (value_of(f.left) < value_of(left)) return;
       const Moment<S> m(curved, f, f.left - left);
       f = {m.at, m.velocity, f.x_end, f.v_end, left};
     };

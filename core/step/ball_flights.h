@@ -153,8 +153,10 @@ class BallFlights {
       const double reach = f.values.radius + 0.125 * path.left * norm(path.v_end - path.v);
       const double a[3] = {path.x.x, path.x.y, path.x.z}, b[3] = {path.x_end.x, path.x_end.y, path.x_end.z};
       Box box;
-      for (int d = 0; d < 3; ++d) box.low[d] = std::min(a[d], b[d]) - reach, box.high[d] = std::max(a[d], b[d]) + reach;
-      if (!std::isfinite(dot(path.x, path.x_end))) return {};  // the substep diverges
+      for (int d = 0; d < 3; ++d) {
+        box.low[d] = std::min(a[d], b[d]) - reach, box.high[d] = std::max(a[d], b[d]) + reach;
+        if (!std::isfinite(box.high[d] - box.low[d])) return {};  // the substep diverges
+      }
       boxes.push_back(box);
     }
     return overlaps(boxes, boxes, true);
