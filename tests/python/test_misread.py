@@ -150,6 +150,8 @@ def test_a_length_in_another_unit_is_named() -> None:
     sb.add_rope(heavy, "rope", segments=8, length=0.5, density=0.05, EI=2e-3, clamp_start=(1, 0, 0))
     heavy.add_point_mass(8, 20.0, "plug")
     assert "`mass` of plug is 20 kg" in said(scene=heavy)
+    weighed = replace(e, scene=heavy)
+    assert implausible(FitProblem([weighed], as_parameters(["rope_EI", "plug_mass"], [weighed]))) == ()
     assert "Is it in g/m? Then write `density` = 0.05" in said(scene=rope(density=50.0, EI=2.0))
 
 

@@ -30,7 +30,7 @@ def other_than_meant(experiments: Sequence[Experiment], parameters: Parameters |
     """The same, before a fit; None of a scene of which nothing is fitted."""
     free = set() if parameters is None else {parameters.roots[name][0] for name in parameters.free}
     known = {name: q.value for name, q in quantities_of(experiments).items() if name not in free}
-    found = (words for e in experiments for words in (*_of(known, e.scene), *other_units(e)))
+    found = (words for e in experiments for words in (*_of(known, e.scene), *other_units(e, free)))
     return tuple(dict.fromkeys(found))
 
 

@@ -7,7 +7,7 @@ the sentence says which slip it looks like.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 
 import numpy as np
 
@@ -24,9 +24,9 @@ HEAVY = 50.0  # times the mass of all else: what hangs on it hardly ever is
 GRAMS = 1.0  # kg: a bob of 100 g on a thread is that heavy, but one that was weighed in grams is told as 1 or more
 
 
-def other_units(e: Experiment) -> Iterator[str]:
-    """Sentences on sizes in the scene of an experiment that its recording contradicts."""
-    yield from _hung(e)
+def other_units(e: Experiment, fitted: Container[str] = ()) -> Iterator[str]:
+    """Sentences on sizes in the scene of an experiment that its recording contradicts; `fitted` are no given masses."""
+    yield from (words for name, words in _hung(e) if f"{name}_mass" not in fitted)
     if e.is_cloud:
         return
     for name, flat, places in _objects(e):
@@ -55,8 +55,8 @@ def other_units(e: Experiment) -> Iterator[str]:
         )
 
 
-def _hung(e: Experiment) -> Iterator[str]:
-    """Point masses that are far heavier than all else."""
+def _hung(e: Experiment) -> Iterator[tuple[str, str]]:
+    """Point masses that are far heavier than all else, with sentences on them."""
     masses = {n.removesuffix("_mass"): q.value for n, q in e.scene.quantities.items() if n.endswith("_mass")}
     offset, _ = e.scene.compiled.layout["mass"]
     total = float(np.sum(e.scene.compiled.inputs()[offset : offset + e.scene.particle_count]))
@@ -64,7 +64,7 @@ def _hung(e: Experiment) -> Iterator[str]:
         rest = total - mass
         if name not in e.scene.bodies and mass >= GRAMS and 0.0 < HEAVY * rest < mass:
             times = short(mass / rest, 2)
-            yield f"`mass` of {name} is {short(mass)} kg, {times} times all else in the scene. Is it in g?"
+            yield name, f"`mass` of {name} is {short(mass)} kg, {times} times all else in the scene. Is it in g?"
 
 
 def _objects(e: Experiment) -> Iterator[tuple[str, list[int], Array]]:
