@@ -119,6 +119,42 @@ def test_a_push_that_no_marker_shows_is_left_out(tmp_path: Path) -> None:
     assert any("something that no marker shows pushes it" in sentence for sentence in found.seen)
 
 
+def pulled(rest: float, release: float) -> np.ndarray:
+    """A cloth in two clips, 20 mm above its upper markers, that a hand pulls aside from `rest` on and lets go at
+    `release`, s; from the first frame on where they are the same."""
+    flat = grid(6, 6, 0.05, 0.05)
+    across, below = flat[:, 0], 0.02 - flat[:, 1] + 0.4 * flat[:, 0] * (0.25 - flat[:, 0])
+    t = np.arange(241)[:, None] / RATE
+    aside = 0.6 * (np.clip((t - rest) / (release - rest), 0.0, 1.0) if release > rest else 1.0)
+    free = np.maximum(t - release, 0.0)
+    angle = aside * np.cos(7.0 * free) * np.exp(-0.5 * free)
+    return np.stack([across + 0.0 * t, below * np.sin(angle), 1.2 - below * np.cos(angle)], axis=2)
+
+
+@pytest.mark.parametrize(("rest", "release"), [(0.4, 0.4), (0.4, 1.0)])
+def test_a_cloth_that_a_hand_pulls_aside_and_lets_go(tmp_path: Path, rest: float, release: float) -> None:
+    """It was fitted from the equilibrium on, where nothing moves it, and the fit missed all of the motion, 62 mm."""
+    x = pulled(rest, release)
+    fastest = release + 0.5 * np.pi / 7.0
+    x[round(RATE * fastest) - 3 : round(RATE * fastest) + 4, 17] = np.nan
+    found, content = drafted(tmp_path, x)
+    (recording,) = content["recording"]
+    assert fastest + 0.02 < recording["fit"][0] < fastest + 0.1  # in the first frame with all of its markers
+    assert "start" not in recording
+    (cloth,) = content["scene"]["cloth"]
+    assert cloth["shape"] == cloth["velocity"] == "recording"
+    assert any("something that no marker shows pushes it" in sentence for sentence in found.seen)
+    assert "whether anything still touches the cloth" in found.text
+
+
+def test_a_cloth_whose_clips_move_first_starts_at_rest(tmp_path: Path) -> None:
+    x = pulled(0.4, 1.0)
+    x[..., 1] += 0.05 * np.sin(6.0 * np.maximum(np.arange(241)[:, None] / RATE - 0.4, 0.0))
+    _, content = drafted(tmp_path, x)
+    (recording,) = content["recording"]
+    assert recording["start"] == "equilibrium" and recording["fit"][0] == 0.0
+
+
 def plucked() -> np.ndarray:
     """A ruler on the edge of a desk, bent by a finger and let go after 0.25 s; two markers in the clamp."""
     t = np.maximum(np.arange(541) / 240 - 0.25, 0.0)[:, None]

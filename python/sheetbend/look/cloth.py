@@ -23,6 +23,7 @@ from .sheet import flattened, placed, spacing
 from .slung import slack
 from .take import Description, Measured, Take, max_gap
 from .text import joined, table
+from .unseen import Freed, freed, moves_first
 
 Array = np.ndarray
 CELLS = 10  # along the longer side
@@ -83,10 +84,14 @@ def _described(takes: Sequence[Take], measured: Measured, stands: bool) -> Descr
         own = sorted(sheets[pair[0]].own + sheets[pair[1]].own)
         unknown.append(lies_over(names, own, "they hang from two rows that face each other, on either side of it"))
     sheets = [sheet for k, sheet in enumerate(sheets) if k not in sides]
+    free = _freed(takes, sheets)
     for sheet in sheets:
         notes += seen_of(s, sheet, len(cloths) > 1)
         if _moves(s, sheet):
             notes.append("it moves at the first frame: speeds at the start are those of the markers")
+    if free is not None:
+        takes, notes, unknown = [free.take], [*notes, free.said], [free.unknown, *unknown]
+        sheets = [replace(sheet, starts_flat=False) for sheet in sheets]
     if not sheets:
         fix = "measure the fabric between the markers and write the configuration by hand, see docs/configuration.md"
         raise RecordingError("markers", "lie on a cloth that something holds up from below", joined(names), fix)
@@ -101,7 +106,17 @@ def _described(takes: Sequence[Take], measured: Measured, stands: bool) -> Descr
     if unused:
         unknown.append(f"what the markers {joined(names[k] for k in unused)} are attached to: they are left out")
     kind = ("a cloth" if len(sheets) == 1 else f"{len(sheets)} cloths") + (" at rest" if s.static else "")
-    return Description(kind, notes, unknown, _lines(takes, sheets, density, measured))
+    return Description(kind, notes, unknown, _lines(takes, sheets, density, measured, free is not None))
+
+
+def _freed(takes: Sequence[Take], sheets: Sequence[Sheet]) -> Freed | None:
+    """The part of the only recording in which cloths move freely that something unseen moved; None elsewhere."""
+    s = takes[0].seen
+    if len(takes) > 1 or s.static or not s.rest or any(sheet.ride or sheet.wind is not None for sheet in sheets):
+        return None
+    own = [k for sheet in sheets for k in sheet.own]
+    holding = [k for sheet in sheets for hold in sheet.held for k in hold.markers]
+    return freed(takes[0], own, "cloth") if own and moves_first(s, own, holding) else None
 
 
 def _bars(sheets: Sequence[Sheet]) -> dict[int, tuple[float, ...]]:
@@ -211,7 +226,9 @@ def _wind(s: Seen, own: list[int], row: list[int], up: Array, density: float) ->
     return np.asarray(speed * across / np.linalg.norm(across))
 
 
-def _lines(takes: Sequence[Take], sheets: Sequence[Sheet], density: float, measured: Measured) -> list[str]:
+def _lines(
+    takes: Sequence[Take], sheets: Sequence[Sheet], density: float, measured: Measured, midway: bool
+) -> list[str]:
     s, r = takes[0].seen, takes[0].seen.recording
     lines = takes[0].scene_lines
     solver: dict[str, Any] = {"method": "newton"}
@@ -231,7 +248,10 @@ def _lines(takes: Sequence[Take], sheets: Sequence[Sheet], density: float, measu
         own, r = _recording(take, sheets[0].ride), take.seen.recording
         driving = [k for sheet in sheets for hold in sheet.held for k in hold.driving(s)]
         own["max_gap"] = max_gap(r.times, r.mask[:, driving])
-        lines += table("[[recording]]", own, {"max_gap": "s, for which a marker of a grip is lost"})
+        why = {"max_gap": "s, for which a marker of a grip is lost"}
+        if midway:
+            why["fit"] = "begins after what no marker shows has let go"
+        lines += table("[[recording]]", own, why)
     for sheet in sheets:
         lines += _parameters(sheet, density, s.static) + _guesses(sheet, measured, s.static)
     if winds:

@@ -17,10 +17,9 @@ from .rope_words import notes_of, unknown_of
 from .seen import Seen
 from .take import Description, Measured, Take
 from .text import joined
-from .unseen import free_from
+from .unseen import freed
 
 LEAST_HELD = 30  # frames before a rope is let go
-LEAST_FREE = 0.2  # of a recording: how much is left at least where its beginning is cut off
 
 
 def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
@@ -45,7 +44,10 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         return None
     pushed = None
     if s.rest and not s.static and not found.grips and len(takes) == 1:
-        takes, pushed = _free(takes[0], found)
+        free = freed(takes[0], found.order, "rope")
+        if free is not None:
+            takes, pushed = [free.take], free.said
+            found.unknown.append(free.unknown)
     rope = model_of(marked_by(takes, found, holding), order, measured, pushed)
     kind = "a rope at rest" if s.static else "a rope"
     return Description(kind, notes_of(rope), unknown_of(rope), lines_of(rope))
@@ -77,24 +79,6 @@ def _while_held(take: Take, measured: Measured, let_go: float) -> Description | 
             f"it falls freely from {let_go:.3g} s on: what holds it lets go, and only the time before is used"
         )
     return found
-
-
-def _free(take: Take, found: Held) -> tuple[list[Take], str | None]:
-    """The part of a recording in which a rope moves freely that rested before, though nothing that holds it moves, and
-    what is said of it."""
-    s, r = take.seen, take.seen.recording
-    start = free_from(r, s.rest, found.order)
-    if start + LEAST_FREE * float(r.times[-1] - r.times[0]) > r.times[-1]:
-        return [take], None
-    found.unknown.append(
-        f"whether anything still touches the rope after {start:.4g} s. If so, let `fit` in [[recording]] begin later"
-    )
-    said = (
-        f"it rests for the first {s.rest:.2g} s and then moves, though what holds it stays: something that no marker "
-        f"shows pushes it, or bends it and lets go. The fit begins at {start:.4g} s, where it moves fastest for the "
-        "first time, with the places and speeds of the markers"
-    )
-    return [replace(take, seen=replace(s, recording=r.piece(start), rest=0.0))], said
 
 
 def _at_rest(s: Seen, order: tuple[int, ...], hanging: bool) -> Held:
