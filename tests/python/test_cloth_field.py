@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +15,12 @@ from sheetbend.cli.cloth_figures import stiffness_figures
 from sheetbend.cli.figures import figure_files
 from sheetbend.config import load
 from sheetbend.experiment.wanted import as_parameters
+from sheetbend.fitting.reached import Reached
 from sheetbend.minimum.problem import FitProblem
+from sheetbend.minimum.search import Search
 from sheetbend.objects.stiffness_field import StiffnessField
 
+behind = importlib.import_module("sheetbend.fitting.fit")  # the package has the function under this name
 SIDE, WARP, NOISE = 0.3, 20.0, 3e-4
 SOLVER, TIMES = sb.Solver(h=0.01, method="newton"), np.arange(25) / 50
 SEEN = range(0, 49, 2)
@@ -155,6 +160,31 @@ def test_a_configuration_fits_a_field_on_its_mesh_alone(tmp_path: Path) -> None:
     (tmp_path / "hung.toml").write_text(tomli_w.dumps(config | {"fit": {"double_segments": True}}))
     with pytest.raises(sb.ConfigError, match=r"fit.double_segments: does not go with stiffness_modes"):
         load(tmp_path / "hung.toml").options  # noqa: B018
+
+
+def test_size_and_length_are_sought_again_where_the_first_minimum_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Once, from the lower minimum, and not through windows."""
+    e = seen(6, 0.2 * np.random.default_rng(1).standard_normal(6))
+    given: dict[str, Any] = {"smooth": {"cloth_stiffness": sb.Smooth()}, "refine": False, "profiles": False}
+    plain = sb.fit(e, parameters=["cloth_warp"], **given)
+    settled, reach, told, windows = behind.settled, behind.reach, list[Any](), list[Any]()
+
+    def leaving(search: Search, problem: FitProblem, beginnings: bool) -> Reached:
+        windows.append(search.windows)
+        found = reach(search, problem, beginnings)
+        return replace(found, ends=(found.ends[0], *found.ends))
+
+    def seeking(*given: Any) -> Any:
+        told.append(given)
+        return settled(*given)
+
+    monkeypatch.setattr(behind, "reach", leaving)
+    monkeypatch.setattr(behind, "settled", seeking)
+    again = sb.fit(e, parameters=["cloth_warp"], **given)
+    assert windows == ["auto", ()] and [given[5] for given in told] == ["auto", ()]
+    start = told[1][2]
+    assert start["cloth_warp"].initial == pytest.approx(plain["cloth_warp"].value, rel=1e-3)
+    assert again["cloth_warp"].value == pytest.approx(plain["cloth_warp"].value, rel=0.02)
 
 
 def long_fall() -> tuple[sb.Recording, np.ndarray]:

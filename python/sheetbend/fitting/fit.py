@@ -212,6 +212,12 @@ def fit(
     check_given(asked.given, problem)
     check_bootstrap(bootstrap, problem)
     reached = reach(search, problem, beginnings)
+    if fields and reached.left_its_end and not reached.interrupted:
+        # Sizes and lengths came from the minimum that was left, so they are sought once more from the lower one.
+        found_at = problem.parameters.starting_at(reached.best.u)
+        wanted, found_at, fields = settled(fitted, wanted, found_at, fields, threads, (), progress)
+        problem = FitProblem(fitted, wanted, threads=threads, expanded=found_at)
+        reached = reach(replace(search, windows=(), starts=()), problem, beginnings)
     if reached.all_lost:
         asked = asked.without_refits()
     refitter, interrupted = reached.found.optimizer, reached.interrupted

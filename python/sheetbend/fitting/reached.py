@@ -49,6 +49,11 @@ class Reached:
         return self.ends[0]
 
     @property
+    def left_its_end(self) -> bool:
+        """Whether another search led lower than the first."""
+        return len(self.ends) > len(self.found.ends)
+
+    @property
     def all_lost(self) -> bool:
         """Whether nothing is derived of any parameter; no refit tells anything then."""
         return len(self.lost) == len(self.problem.parameters.free)
