@@ -648,6 +648,7 @@ RECORDINGS: dict[str, Callable[[], Call]] = {
     "Recording.piece": lambda: (recording().piece, {"start": 0.0, "stop": 0.01}),
     "Recording.frames": lambda: (recording().frames, {"which": slice(0, 2)}),
     "Recording.hidden": lambda: (recording().hidden, {"spans": [(0.0, 0.01)]}),
+    "Recording.compared": lambda: (recording().compared, {"markers": [0, 1], "name": "part"}),
     "Recording.select": lambda: (recording().select, {"markers": [0, 1]}),
     "Recording.resample": lambda: (recording().resample, {"times": TIMES, "kind": "linear", "max_gap": 0.1}),
     "Recording.shifted": lambda: (recording().shifted, {"t0": 0.1}),

@@ -100,7 +100,7 @@ def shares(c: Comparison, values: Values | None = None) -> Shares | None:
     told = c.experiment.sigma**2 * len(axes)
     residual = np.where(seen[..., None], c.simulated[fitted][..., axes] - measured, np.nan)
     left, moved = (_variance(x, seen, c.experiment.loss) for x in (residual, measured))
-    part = replace(c.recording, positions=c.recording.positions[fitted], times=c.recording.times[fitted])
+    part = c.recording.frames(fitted)
     carried = carried_baselines(c.experiment, [(c.experiment, part)], part, values)
     beside = [_variance(measured - x[..., axes], seen, c.experiment.loss) for x in carried.values()]
     least = min(beside, default=np.inf)
@@ -146,7 +146,7 @@ def _hardly_better(c: Comparison, values: Values) -> str:
     """Why both parts of a driven motion count as not predicted; empty where one is, or nothing is held out."""
     fitted, e = ~c.held_out, c.experiment
     told = SEEN * e.sigma * float(np.sqrt(len(e.axes)))
-    part = replace(c.recording, positions=c.recording.positions[fitted], times=c.recording.times[fitted])
+    part = c.recording.frames(fitted)
     if c.baseline is None or not c.recording.mask[fitted].any() or not c.recording.mask[c.held_out].any():
         return ""
     carried = carried_baselines(e, [(e, part)], part, values)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -210,11 +210,8 @@ class Experiment:
         part = self.recording if window is None else self.recording.piece(*window)
         if isinstance(part, Cloud):
             return part.named(self.name).pooled() if self.static else part.named(self.name)
-        positions = part.positions[:, list(self.compared)]
-        times = part.times
-        if self.static and len(times) > 1:
-            positions, times = np.nanmean(positions, axis=0, keepdims=True), times[:1]
-        return replace(part, positions=positions, times=times, markers=self.names, clamped=(), name=self.name)
+        markers = part.compared(self.compared, self.name)
+        return markers.mean() if self.static and len(part.times) > 1 else markers
 
     @property
     def t0(self) -> float:

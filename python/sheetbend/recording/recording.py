@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import timeseries
 from ..arrays.checks import MOST, is_bound, is_list, is_number, numbers
 from ..arrays.timeseries import Array, Kind
 from ..errors import RecordingError
+from ..files.names import checked_name
 from . import io
 from .marker_data import MarkerData, read_only
 from .of_poses import markers_of_poses
@@ -134,14 +135,17 @@ class Recording(MarkerData):
             )
         return self._derive(positions=self.positions[keep], times=self.times[keep])
 
-    def frames(self, which: slice) -> Recording:
-        """Frames by number, for example `frames(slice(0, None, 2))` for every second one.
+    def frames(self, which: slice | NDArray[np.bool_]) -> Recording:
+        """Frames by number, for example `frames(slice(0, None, 2))` for every second one, or those where an array with
+        one Boolean per frame is True. A marker may be unseen in all of them.
 
         Raises:
-            RecordingError: the slice holds no frame or runs backwards.
+            RecordingError: no frame is chosen, a slice runs backwards, or it is neither.
         """
-        if not isinstance(which, slice):
-            raise RecordingError("frames", "must be a slice", which, "write frames(slice(start, stop, step))")
+        each = isinstance(which, np.ndarray) and which.dtype == np.bool_ and which.shape == self.times.shape
+        if not each and not isinstance(which, slice):
+            fix = f"write frames(slice(start, stop, step)), or give an array of {len(self.times)} Booleans"
+            raise RecordingError("frames", "must be a slice or one Boolean per frame", which, fix)
         times = self.times[which]
         if len(times) == 0 or (len(times) > 1 and times[1] < times[0]):
             raise RecordingError(
@@ -200,6 +204,26 @@ class Recording(MarkerData):
             markers=tuple(self.markers[i] for i in chosen),
             clamped=tuple(new for new, old in enumerate(chosen) if old in driven),
         )
+
+    def compared(self, markers: Sequence[str | int], name: str) -> Recording:
+        """The given markers (names or indices), none of which counts as clamped, under another name. One that is never
+        seen stays, with NaN throughout: a piece of a recording may lack a marker.
+
+        Raises:
+            RecordingError: a marker is unknown or named twice, or the name can be that of no file.
+        """
+        chosen = marker_indices("markers", markers, self.markers)
+        names = tuple(self.markers[i] for i in chosen)
+        return self._derive(
+            positions=self.positions[:, chosen], markers=names, clamped=(), name=checked_name("name", name)
+        )
+
+    def mean(self) -> Recording:
+        """One frame, at the time of the first, with the mean place of each marker: several frames at rest."""
+        seen = self.mask.any(axis=0)
+        places = np.full((1, *self.positions.shape[1:]), np.nan)
+        places[0, seen] = np.nanmean(self.positions[:, seen], axis=0)
+        return self._derive(positions=places, times=self.times[:1])
 
     def resample(self, times: ArrayLike, kind: Kind = "linear", max_gap: float | None = None) -> Recording:
         """The recording at other times; NaN wherever a marker's two neighboring samples are too far apart.
