@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
 import sheetbend as sb
 from pytest import approx
 from sheetbend.doubts.stationary import from_start, no_minimum
@@ -29,8 +30,8 @@ def test_a_search_that_ends_above_its_start_goes_from_there() -> None:
     assert [start.converged for start in result.starts] == [True, False]
 
 
-def test_an_end_above_its_start_is_no_minimum() -> None:
-    """Where the start has no lower end, or cannot be searched from."""
+def test_an_end_above_its_start_is_no_minimum(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the start has no lower end, or cannot be searched from. Ctrl-C in that search is no end of it."""
     e = seen(flag(), flag())
     problem = FitProblem([e], as_parameters(["cloth_bending"], [e]))
     u = problem.parameters.initial() + 0.5
@@ -39,5 +40,8 @@ def test_an_end_above_its_start_is_no_minimum() -> None:
     assert no_minimum(problem, replace(end, first=None)) == ""
     (best, last) = from_start(Search(), problem, [end])
     assert last is end and best.cost < 0.1 * end.cost and no_minimum(problem, best) == ""
+    monkeypatch.setattr(Search, "onward", lambda *_: replace(best, interrupted=True))
+    with pytest.raises(KeyboardInterrupt):
+        from_start(Search(), problem, [end])
     below = replace(end, first=2.0 * end.cost)
     assert from_start(Search(), problem, [below]) == (below,)

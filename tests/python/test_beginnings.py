@@ -179,6 +179,20 @@ def test_an_interrupted_last_search_leaves_an_end_that_is_no_minimum(monkeypatch
     assert result.interrupted and not result.starts[0].converged
 
 
+def test_ctrl_c_in_the_search_from_a_beginning_ends_the_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ceres answers it with its best so far, which was taken for an end like any other, and the fit went on."""
+    e, onward, searched = rope(0.005, 1.5, {"drag_linear": 0.01}), Search.onward, []
+
+    def stopped(search: Search, problem: FitProblem, u: np.ndarray) -> Minimum:
+        searched.append(u)
+        return replace(onward(search, problem, u), interrupted=True)
+
+    monkeypatch.setattr(behind, "MANY", 2)
+    monkeypatch.setattr(Search, "onward", stopped)
+    result = sb.fit(e, parameters=["rope_EI", "rope_drag_linear"], profiles=False, refine=False).result
+    assert result.interrupted and len(searched) == 1 and not result.starts[0].converged
+
+
 def test_a_right_model_is_not_contradicted_by_its_beginnings() -> None:
     """Noise that is alike from frame to frame, which makes the beginnings be fitted."""
     e = rope(0.01, 1.5, {"drag_linear": 0.005, "bend_damping": 0.01})

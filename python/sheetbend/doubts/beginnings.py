@@ -130,6 +130,8 @@ def checked(
         other = search.onward(problem, found[-1].u)
     except SheetbendError:
         return tuple(ends), found
+    if other.interrupted:
+        raise KeyboardInterrupt
     if not (other.converged and other.cost < (1.0 - LOWER) * ends[0].cost):
         return tuple(ends), found
     return (other, *ends), beginnings(problem, other, growths)

@@ -66,6 +66,8 @@ def from_start(search: Search, problem: FitProblem, ends: Sequence[Minimum]) -> 
         other = search.onward(problem, start)
     except SheetbendError:
         return tuple(ends)
+    if other.interrupted:
+        raise KeyboardInterrupt
     return (other, *ends) if other.cost < ends[0].cost else tuple(ends)
 
 

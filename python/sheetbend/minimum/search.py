@@ -156,7 +156,7 @@ class Search:
         return found
 
     def onward(self, problem: FitProblem, u: np.ndarray) -> Minimum:
-        """Search on the whole motion from a point that came out of its windows. Ctrl-C passes through.
+        """Search on the whole motion from a point that came out of its windows. Ctrl-C ends it with its best so far.
 
         Raises:
             SheetbendError: the motion has no answer there.
