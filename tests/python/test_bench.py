@@ -236,7 +236,7 @@ class TestCommand:
         assert result.exit_code == 2 and last_line(result)["error"]["field"] == field
 
     def test_unknown_workloads_are_answered_with_the_known(self) -> None:
-        assert "W1, W1s, W2, W5, chain, rod, cloth, ladder" in last_line(run("sheet", "--json"))["error"]["fix"]
+        assert "W1, W1s, W2, W5, chain, bodies, rod, cloth, ladder" in last_line(run("sheet", "--json"))["error"]["fix"]
 
     def test_a_wrong_gradient_exits_5(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr("sheetbend_bench.measurement.largest_error", lambda problem, found: 1e-3)

@@ -96,6 +96,7 @@ WHOLE: dict[str, Any] = {
         "collider": [{"name": "table", "shape": "plane"}],
         "contact": [{"of": "rope", "collider": "table", "friction": 0.3}],
         "self_contact": {"of": "rope", "radius": 0.001, "friction": 0.3, "pairs": 40},
+        "collisions": {"of": "a", "radius": 0.01, "restitution": 0.5},
         "quantities": {"NAME": {}},
     },
     "marker": [{"marker": "m0", "particle": "a"}],

@@ -17,7 +17,7 @@ from sheetbend.gripped import fit_rope
 from sheetbend.minimum import linear_algebra
 from sheetbend.minimum.linear_algebra import one_blas_thread
 from sheetbend.minimum.workers import Common, working_on
-from sheetbend.textile import fit_fabric, fit_pull, fit_tests
+from sheetbend.textile import Curve, fit_fabric, fit_pull, fit_tests
 from test_journal import swinging
 from test_workers import Backwards
 from threadpoolctl import threadpool_info, threadpool_limits
@@ -94,10 +94,17 @@ class Watched:
         raise Looked(blas_threads())
 
 
+class WatchedCurve(Watched, Curve):
+    """The same as a curve that has no numbers."""
+
+    def __init__(self) -> None:
+        pass
+
+
 OTHERS: dict[str, Callable[[Any], Any]] = {
     "fit_many": lambda watched: sb.fit_many(watched, ["rope_EI"]),
     "fit_rope": lambda watched: fit_rope(watched, density=0.1, gravity=(0.0, 0.0, -9.81)),
-    "fit_pull": lambda watched: fit_pull([watched]),
+    "fit_pull": lambda _: fit_pull([WatchedCurve()]),
     "fit_fabric": lambda watched: fit_fabric(watched, watched, ["warp"]),
     "fit_tests": fit_tests,
 }

@@ -37,6 +37,12 @@ def clothed() -> tuple[sb.Scene, sb.Cloth]:
     return scene, sb.add_cloth(scene, sheet(), density=0.2, warp=40.0, shear=5.0, bending=1e-4)
 
 
+def blown() -> sb.Scene:
+    scene = clothed()[0]
+    scene.add_air(**_air(scene), normal=0.6, tangential=0.1)
+    return scene
+
+
 def bricks() -> sb.SolidMesh:
     return sb.mesh.bricks((0.2, 0.1, 0.1), (2, 1, 1))
 
@@ -457,7 +463,7 @@ OBJECTS: dict[str, Callable[[], Call]] = {
     ),
     "add_unknown_wind": lambda: (
         sb.add_unknown_wind,
-        {"scene": clothed()[0], "scale": 0.1, "spacing": 0.1, "duration": 0.2, "name": "gust"},
+        {"scene": blown(), "scale": 0.1, "spacing": 0.1, "duration": 0.2, "name": "gust"},
     ),
     "add_arm": lambda: (
         sb.add_arm,

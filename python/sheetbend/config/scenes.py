@@ -152,7 +152,7 @@ def _add_particles(scene: Scene, particles: Particles, section: schema.SceneSect
             if some.pinned:
                 scene.pin(added)
             if some.drag is not None:
-                add_air_drag(scene, added, f"{some.name}_drag", some.drag, "N s^2/m^2")
+                add_air_drag(scene, added, some.name, some.drag, "N s^2/m^2")
         if some.body is not None:
             body = named_body(f"{path}.body", some.body, scene)
             with located(path, "attach"):

@@ -101,20 +101,21 @@ def check_friction(name: str, friction: float, slip_angle: float) -> None:
 def _air(scene: Scene, arm: Arm, drag: float) -> None:
     """Quadratic drag on the arm's end: on a fixed pivot its torque is `drag` times the square of the rate."""
     per_length = (f"{arm.name}_length", "inverse")
-    add_air_drag(scene, arm.end, f"{arm.name}_drag", drag, "N m s^2/rad^2", (per_length, per_length, per_length))
+    add_air_drag(scene, arm.end, arm.name, drag, "N m s^2/rad^2", (per_length, per_length, per_length))
 
 
 def add_air_drag(
-    scene: Scene, nodes: ArrayLike, quantity: str, drag: float, unit: str, factors: tuple[tuple[str, str], ...] = ()
+    scene: Scene, nodes: ArrayLike, name: str, drag: float, unit: str, factors: tuple[tuple[str, str], ...] = ()
 ) -> None:
-    """Add quadratic drag on each of the nodes, a quantity in its own unit; factors of others make it N s^2/m^2.
+    """Add quadratic drag on each of the nodes, the quantity `<name>_drag` in its own unit; factors of others make it
+    N s^2/m^2.
 
     Raises:
         SceneError: a negative drag, or a name that is taken.
     """
     if not (is_number(drag) and math.isfinite(drag) and drag >= 0.0):
-        raise SceneError(quantity, "must be zero or more", drag, f"give a number in {unit}")
+        raise SceneError(f"{name}.drag", "must be zero or more", drag, f"give a number in {unit}")
     scene.has_drag = True
     limits = None if drag > 0.0 else ZERO_OR_MORE
-    scene.add_quantity(quantity, drag, unit, positive=drag > 0.0, limits=limits)
+    quantity = scene.add_quantity(f"{name}_drag", drag, unit, positive=drag > 0.0, limits=limits)
     scene.add_terms([Term("drag_quadratic", np.ravel(nodes), 1.0, ((quantity, "identity"), *factors))])

@@ -74,7 +74,9 @@ class Air:
             SceneError: no triangles, or it changes already.
         """
         if not len(self.triangles):
-            raise SceneError("wind", "blows on nothing", None, "call Scene.add_air first, or give a cloth air_normal")
+            raise SceneError(
+                "wind", "blows on nothing", None, "call Scene.add_air first (air_normal of a cloth in a configuration)"
+            )
         if self._blowing is None:
             self._blow(scene, None, None)
         if len(self.times) > 1:
