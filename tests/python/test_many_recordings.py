@@ -123,6 +123,11 @@ def test_the_bits_do_not_depend_on_the_workers(executor: Executor, monkeypatch: 
 
 def test_it_tells_and_saves_all_recordings(tmp_path: Path) -> None:
     found = fitted()
+    e = found["rope_EI"]
+    sharp = replace(
+        found, estimates=(replace(e, value=0.00100012, half_width=3e-8, lower=0.00100009, upper=0.00100015),)
+    )
+    assert "0.001000120  [0.001000090, 0.001000150]" in sharp.report()  # to two digits of the half-width
     text = found.report()
     assert "Shared parameters" in text and "rope_bend_damping" in text and "20 recordings" in text
     assert all(len(line) <= 120 for line in text.splitlines())

@@ -19,6 +19,7 @@ from ..files.typed import as_dataclass, as_type, mapping
 from ..files.whole import write_text
 from ..quantities.wording import short
 from ..result.estimate import Estimate, estimate_of
+from .report import estimate_row
 from .tables import Section, plain_section
 
 FORMAT = "sheetbend many 2"
@@ -157,9 +158,9 @@ class ManyFit:
     def _sections(self) -> list[Section]:
         shared = []
         for e in self.estimates:
-            ends = "" if e.lower is None or e.upper is None else f"[{short(e.lower, 5)}, {short(e.upper, 5)}]"
+            name, value, _, ends, unit, verdict = estimate_row(e)
             more = "" if e.name not in self.scatter else short(self.scatter[e.name], 2)
-            shared.append((e.name, short(e.value, 5), ends, e.unit, more, e.verdict))
+            shared.append((name, value, ends, unit, more, verdict))
         words = "standard deviation from the scatter between recordings over that of independent residuals"
         headers = ("parameter", "value", "95 % interval", "unit", "scatter", "verdict")
         note = ("scatter", f"{words}; the larger counts")

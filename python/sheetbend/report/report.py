@@ -142,7 +142,7 @@ def _unsound(result: FitData) -> Section:
 
 
 def _parameters(result: FitData) -> Section:
-    rows = [_estimate_row(estimate) for estimate in result.estimates]
+    rows = [estimate_row(estimate) for estimate in result.estimates]
     rows += [_given_row(given) for given in result.given]
     headers: tuple[str, ...] = ("parameter", "value", "+/-", "95 % interval", "unit", "verdict")
     notes = [("intervals", words) for words in result.not_counted]
@@ -173,7 +173,8 @@ def _in_all(estimate: Estimate) -> str:
     return figures((estimate.value, estimate.in_all), estimate.in_all)[1]
 
 
-def _estimate_row(estimate: Estimate) -> tuple[str, ...]:
+def estimate_row(estimate: Estimate) -> tuple[str, ...]:
+    """Name, value, half-width, interval, unit and verdict, to two digits of the half-width."""
     ends = (estimate.lower, estimate.upper)
     numbers = (estimate.value, estimate.half_width, *ends)
     if _lopsided(*ends):
