@@ -10,7 +10,7 @@ import copy
 import hashlib
 import pickle
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -120,37 +120,40 @@ class Recordings:
 
 def triangles(recordings: Recordings, item: Item) -> Array | str:
     """[own | shared | residual] of each recording, reduced to as many rows as columns."""
-    found = []
-    for _, small, u in recordings.each(item):
-        made = small.rows(u, True)
-        if isinstance(made, str):
-            return made
-        r, J = made
-        found.append(padded(np.column_stack([J[:, small.own], J[:, small.shared], r])).ravel())
-    return np.concatenate(found)
+
+    def triangle(_: int, small: Small, r: Array, J: Array) -> Array:
+        return padded(np.column_stack([J[:, small.own], J[:, small.shared], r])).ravel()
+
+    return _joined(recordings, item, True, triangle)
 
 
 def norms(recordings: Recordings, item: Item) -> Array | str:
     """The root of the sum of squares of each recording's residuals."""
-    found = []
-    for _, small, u in recordings.each(item):
-        made = small.rows(u, False)
-        if isinstance(made, str):
-            return made
-        found.append(np.sqrt(made[0] @ made[0]))
-    return np.array(found)
+    return _joined(recordings, item, False, lambda _, __, r, ___: np.sqrt([r @ r]))
 
 
 def told(recordings: Recordings, item: Item) -> Array | str:
     """Of each recording the sum of squared residuals without priors, their number, and the covariance of its own
     numbers."""
+
+    def misfit(i: int, small: Small, r: Array, J: Array) -> Array:
+        data = small.core.data_rows
+        return np.append([r[:data] @ r[:data], data], recordings.own_covariance(i, small, r, J))
+
+    return _joined(recordings, item, True, misfit)
+
+
+def _joined(
+    recordings: Recordings, item: Item, jacobian: bool, made_of: Callable[[int, Small, Array, Array], Array]
+) -> Array | str:
+    """What is made of the number, the problem and the rows of each recording, end to end; in words why one has no
+    rows."""
     found = []
     for i, small, u in recordings.each(item):
-        made = small.rows(u, True)
-        if isinstance(made, str):
-            return made
-        r, data = made[0], small.core.data_rows
-        found += [np.array([r[:data] @ r[:data], data]), recordings.own_covariance(i, small, *made).ravel()]
+        rows = small.rows(u, jacobian)
+        if isinstance(rows, str):
+            return rows
+        found.append(made_of(i, small, *rows))
     return np.concatenate(found)
 
 
