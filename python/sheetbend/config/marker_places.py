@@ -20,7 +20,7 @@ from .errors import located
 from .particles import Particles
 from .rope_points import Seats
 from .rope_schema import Rod, Rope
-from .ropes import check_markers
+from .ropes import check_markers, named_rope
 from .scene_schema import SceneSection
 from .solids import named_solid
 
@@ -134,16 +134,10 @@ def _placed(path: str, marker: schema.Marker, scene: Scene, particles: Particles
         with located(path):
             (place,) = on_cloth(_cloth(path, marker.cloth, scene), [marker.material])
     else:
-        name = marker.rope or (next(iter(scene.ropes)) if len(scene.ropes) == 1 else "")
-        if name not in scene.ropes:
-            raise ConfigError(
-                f"{path}.rope",
-                "is no rope of the scene",
-                marker.rope,
-                f"name one of: {', '.join(scene.ropes) or 'none'}",
-            )
+        only = next(iter(scene.ropes)) if len(scene.ropes) == 1 else None
+        rope = named_rope(f"{path}.rope", marker.rope or only, scene)
         with located(path):
-            place = on_rope(scene.ropes[name], marker.arc_length or 0.0)
+            place = on_rope(rope, marker.arc_length or 0.0)
     # A zero offset still sets the frame in which offset quantities count.
     with located(path):
         framed = place.with_offset(marker.offset or (0.0, 0.0, 0.0), marker.normal)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..errors import ConfigError
 from ..objects.over_time import add_unknown_force, add_unknown_wind
 from ..objects.rope import Rope
 from ..scene.body import BodyPoint
@@ -12,6 +11,7 @@ from ..scene.scene import Scene
 from .bodies import named_body
 from .errors import located
 from .moment import Moment
+from .ropes import named_rope
 from .scene_schema import SceneSection, UnknownForce, UnknownWind
 
 
@@ -35,10 +35,7 @@ def add_unknown_inputs(
         if force.body is not None:
             on = named_body(f"{path}.body", force.body, scene).point(force.point)
         elif force.rope is not None:
-            if force.rope not in scene.ropes:
-                known = ", ".join(scene.ropes) or "none"
-                raise ConfigError(f"{path}.rope", "is no rope of this scene", force.rope, f"name one of: {known}")
-            on = scene.ropes[force.rope]
+            on = named_rope(f"{path}.rope", force.rope, scene)
         else:
             on = [find(f"{path}.particles", r) for r in force.particles]
         with located(path, force.name):

@@ -220,10 +220,7 @@ class Recording(MarkerData):
 
     def mean(self) -> Recording:
         """One frame, at the time of the first, with the mean place of each marker: several frames at rest."""
-        seen = self.mask.any(axis=0)
-        places = np.full((1, *self.positions.shape[1:]), np.nan)
-        places[0, seen] = np.nanmean(self.positions[:, seen], axis=0)
-        return self._derive(positions=places, times=self.times[:1])
+        return self._derive(positions=timeseries.mean_position(self.positions)[None], times=self.times[:1])
 
     def resample(self, times: ArrayLike, kind: Kind = "linear", max_gap: float | None = None) -> Recording:
         """The recording at other times; NaN wherever a marker's two neighboring samples are too far apart.
