@@ -1,16 +1,12 @@
 // Restitution: particles that bounce, against closed forms, and their gradients.
 #include "core/rollout/rollout.h"
-#include "tests/cpp/support/contact_scenes.h"
+#include "tests/cpp/support/bounces.h"
 #include "tests/cpp/support/lanes.h"
 
 namespace sheetbend::testing {
 namespace {
 
 constexpr double g = 9.81;
-
-Program program(const Sample& s, double h, double time, Integrator integrator) {
-  return {s.scene, make_plan(s.scene, contact_options(h, integrator)), static_cast<int>(std::lround(time / h))};
-}
 
 // Where the first particle ends, and the gradient of direction . end.
 struct End {
@@ -146,14 +142,8 @@ Sample juggled(double e) {
   return b.build(g);
 }
 
-struct Juggle {
-  Integrator integrator;
-  double h;
-};
 class Juggling : public ::testing::TestWithParam<Juggle> {};
-INSTANTIATE_TEST_SUITE_P(Bounce, Juggling,
-                         ::testing::Values(Juggle{Integrator::bdf1, 1e-3}, Juggle{Integrator::bdf2, 1e-3},
-                                           Juggle{Integrator::bdf1, 8e-3}, Juggle{Integrator::bdf2, 8e-3}));
+INSTANTIATE_TEST_SUITE_P(Bounce, Juggling, juggles());
 
 TEST_P(Juggling, HasTheGradientOfComplexSteps) {
   const Sample s = juggled(0.7);
@@ -165,22 +155,7 @@ TEST_P(Juggling, HasTheGradientOfComplexSteps) {
     impacts += rollout.impacts().size();
   }
   EXPECT_GE(impacts, 4u);
-  const auto found = gradient(p, s.inputs);
-  double largest = 0.0;
-  for (const double a : found) largest = std::max(largest, std::abs(a));
-  for (const Quantity q :
-       {Quantity::position, Quantity::velocity, Quantity::mass, Quantity::gravity, Quantity::friction,
-        Quantity::restitution, Quantity::contact_radius, Quantity::collider_pose, Quantity::collider_size}) {
-    const bool of_particles = q == Quantity::position || q == Quantity::velocity;
-    for (std::size_t i = 0; i < (of_particles ? 9 : q == Quantity::mass ? 3 : s.scene.layout.count(q)); ++i) {
-      const std::size_t at = s.scene.layout.of(q) + i;
-      std::vector<Complex> probe(s.inputs.begin(), s.inputs.end());
-      probe[at].im = complex_step;
-      const double expected = loss(p, probe).im / complex_step;
-      EXPECT_NEAR(found[at], expected, 1e-11 * largest + 1e-9 * std::abs(expected))
-          << quantity_names[static_cast<int>(q)] << " " << i;
-    }
-  }
+  expect_gradient_of_complex_steps(p, s, 3);
 }
 
 TEST_P(Juggling, HasTheSameBitsWhateverKeepsItsStates) {

@@ -1,16 +1,12 @@
 // Balls that hit each other: closed forms, what is conserved, the order of impacts in a substep, and gradients.
 #include "core/rollout/rollout.h"
-#include "tests/cpp/support/contact_scenes.h"
+#include "tests/cpp/support/bounces.h"
 #include "tests/cpp/support/lanes.h"
 
 namespace sheetbend::testing {
 namespace {
 
 constexpr double g = 9.81;
-
-Program program_of_balls(const Sample& s, double h, double time, Integrator integrator) {
-  return {s.scene, make_plan(s.scene, contact_options(h, integrator)), static_cast<int>(std::lround(time / h))};
-}
 
 class Colliding : public ::testing::TestWithParam<Integrator> {};
 INSTANTIATE_TEST_SUITE_P(Collisions, Colliding, ::testing::Values(Integrator::bdf1, Integrator::bdf2));
@@ -21,7 +17,7 @@ TEST_P(Colliding, HandTheirSpeedOn) {
   b.particle({0.0, 0.0, 0.0}, 0.3, {1.0, 0.0, 0.0}), b.particle({0.52, 0.0, 0.0}, 0.3);
   b.balls({0, 1}, {0.1, 0.1}, 1.0);
   const Sample s = b.build(0.0);
-  const Program p = program_of_balls(s, 1.0 / 480.0, 1.0, GetParam());
+  const Program p = program(s, 1.0 / 480.0, 1.0, GetParam());
   const auto all = states(p, s.inputs);
   EXPECT_NEAR(all[p.steps * s.scene.dofs() + 3], 1.2, 1e-12);
   EXPECT_NEAR(all[p.steps * s.scene.dofs()], 0.32, 1e-12);
@@ -44,7 +40,7 @@ TEST_P(Colliding, DoNotPassThroughEachOther) {
   b.particle({0.0, 0.0, 0.0}, 1.0, {100.0, 0.0, 0.0}), b.particle({0.5, 0.0, 0.0}, 1.0);
   b.balls({0, 1}, {0.01, 0.01}, 1.0);
   const Sample s = b.build(0.0);
-  const Program p = program_of_balls(s, 0.01, 0.02, GetParam());
+  const Program p = program(s, 0.01, 0.02, GetParam());
   const auto all = states(p, s.inputs);
   EXPECT_NEAR(all[p.steps * s.scene.dofs()], 0.48, 1e-12);
   EXPECT_NEAR(all[p.steps * s.scene.dofs() + 3], 2.02, 1e-12);
@@ -70,7 +66,7 @@ Sample gas_of_balls(double e, int count = 14) {
 TEST_P(Colliding, KeepMomentumAndEnergy) {
   for (const double e : {1.0, 0.4, 0.0}) {
     const Sample s = gas_of_balls(e);
-    const Program p = program_of_balls(s, 2e-3, 0.4, GetParam());
+    const Program p = program(s, 2e-3, 0.4, GetParam());
     const Inputs<const double> in{s.scene.layout, s.inputs.data()};
     const auto sums = [&](const double* v) {
       std::array<double, 4> sum{};
@@ -112,7 +108,7 @@ TEST_P(Colliding, PassAnImpactOnInOrder) {
     b.particle({0.1 * place, 0.0, 0.0}, 1.0);  // their numbers are not their order
   b.balls({0, 1, 2, 3, 4, 5}, std::vector<double>(6, 0.05), 1.0);
   const Sample s = b.build(0.0);
-  const Program p = program_of_balls(s, 0.1, 1.0, GetParam());
+  const Program p = program(s, 0.1, 1.0, GetParam());
   Rollout<double> rollout(s.scene, p.plan, s.inputs.data());
   std::vector<int> order;
   for (int n = 0; n < p.steps; ++n) {
@@ -132,7 +128,7 @@ TEST_P(Colliding, MeetAfterImpactsAtTheSameInstant) {
     b.particle({0.4 * side, 0.0, 0.0}, 1.0, {-side, 0.0, 0.0}), b.particle({0.15 * side, 0.0, 0.0}, 1.0);
   b.balls({0, 1, 2, 3}, std::vector<double>(4, 0.05), 1.0);
   const Sample s = b.build(0.0);
-  const Program p = program_of_balls(s, 0.5, 1.0, GetParam());
+  const Program p = program(s, 0.5, 1.0, GetParam());
   const auto all = states(p, s.inputs);
   EXPECT_NEAR(all[p.steps * s.scene.dofs()], 0.4 - 1.0 - 0.3, 1e-12);
   std::vector<double> seed(s.scene.dofs());
@@ -154,7 +150,7 @@ TEST_P(Colliding, RestOnEachOther) {
     b.balls({0, 1, 2}, {0.1, 0.1, 0.1}, e);
     constexpr double h = 2e-3;
     const Sample s = b.build(g);
-    const Program p = program_of_balls(s, h, 2.0, GetParam());
+    const Program p = program(s, h, 2.0, GetParam());
     const auto all = states(p, s.inputs);
     double deepest = 0.0, highest = 0.0;
     for (int n = 0; n <= p.steps; ++n)
@@ -182,18 +178,12 @@ Sample juggled_balls() {
   return b.build(g);
 }
 
-struct BallJuggle {
-  Integrator integrator;
-  double h;
-};
-class JugglingBalls : public ::testing::TestWithParam<BallJuggle> {};
-INSTANTIATE_TEST_SUITE_P(Collisions, JugglingBalls,
-                         ::testing::Values(BallJuggle{Integrator::bdf1, 1e-3}, BallJuggle{Integrator::bdf2, 1e-3},
-                                           BallJuggle{Integrator::bdf1, 8e-3}, BallJuggle{Integrator::bdf2, 8e-3}));
+class JugglingBalls : public ::testing::TestWithParam<Juggle> {};
+INSTANTIATE_TEST_SUITE_P(Collisions, JugglingBalls, juggles());
 
 TEST_P(JugglingBalls, HaveTheGradientOfComplexSteps) {
   const Sample s = juggled_balls();
-  const Program p = program_of_balls(s, GetParam().h, 0.08, GetParam().integrator);
+  const Program p = program(s, GetParam().h, 0.08, GetParam().integrator);
   Rollout<double> rollout(s.scene, p.plan, s.inputs.data());
   int together = 0, alone = 0;
   for (int n = 0; n < p.steps; ++n) {
@@ -202,27 +192,12 @@ TEST_P(JugglingBalls, HaveTheGradientOfComplexSteps) {
   }
   EXPECT_GE(together, 2);
   EXPECT_GE(alone, 3);
-  const auto found = gradient(p, s.inputs);
-  double largest = 0.0;
-  for (const double a : found) largest = std::max(largest, std::abs(a));
-  for (const Quantity q :
-       {Quantity::position, Quantity::velocity, Quantity::mass, Quantity::gravity, Quantity::friction,
-        Quantity::restitution, Quantity::contact_radius, Quantity::collider_pose, Quantity::collider_size}) {
-    const bool of_particles = q == Quantity::position || q == Quantity::velocity;
-    for (std::size_t i = 0; i < (of_particles ? 12 : q == Quantity::mass ? 4 : s.scene.layout.count(q)); ++i) {
-      const std::size_t at = s.scene.layout.of(q) + i;
-      std::vector<Complex> probe(s.inputs.begin(), s.inputs.end());
-      probe[at].im = complex_step;
-      const double expected = loss(p, probe).im / complex_step;
-      EXPECT_NEAR(found[at], expected, 1e-11 * largest + 1e-9 * std::abs(expected))
-          << quantity_names[static_cast<int>(q)] << " " << i;
-    }
-  }
+  expect_gradient_of_complex_steps(p, s, 4);
 }
 
 TEST_P(JugglingBalls, HaveTheTangentsOfComplexSteps) {
   const Sample s = juggled_balls();
-  const Program p = program_of_balls(s, GetParam().h, 0.08, GetParam().integrator);
+  const Program p = program(s, GetParam().h, 0.08, GetParam().integrator);
   const Layout& l = s.scene.layout;
   expect_tangents_agree(p, s.inputs,
                         {l.of(Quantity::contact_radius) + l.count(Quantity::contact_radius) - 1,
@@ -233,7 +208,7 @@ TEST_P(JugglingBalls, HaveTheTangentsOfComplexSteps) {
 
 TEST_P(JugglingBalls, HaveTheSameBitsWhateverKeepsTheirStates) {
   const Sample s = juggled_balls();
-  const Program p = program_of_balls(s, GetParam().h, 0.08, GetParam().integrator);
+  const Program p = program(s, GetParam().h, 0.08, GetParam().integrator);
   expect_bits_of_any_tape(p, s.inputs);
   InputsOfLanes inputs(Pack::lanes, s.inputs);
   inputs[3][s.scene.layout.of(Quantity::velocity) + 2] = -0.9;
@@ -251,7 +226,7 @@ TEST(Collisions, AreTheSameHoweverBallsAreNumbered) {
     }
     b.balls({0, 1, 2}, std::vector<double>(3, 0.05), 0.9);
     const Sample s = b.build(g);
-    const Program p = program_of_balls(s, 5e-3, 0.5, Integrator::bdf2);
+    const Program p = program(s, 5e-3, 0.5, Integrator::bdf2);
     const auto all = states(p, s.inputs);
     std::vector<double> found;
     for (int i = 0; i < 3; ++i)

@@ -10,9 +10,11 @@ import numpy as np
 import sheetbend as sb
 from numpy.typing import ArrayLike
 from oracles import integration
+from pytest import approx
 from scipy.optimize import brentq
 from sheetbend import _core
 from sheetbend.motion.core_terms import substeps
+from sheetbend.objects.stiffness_field import StiffnessField
 
 Array = np.ndarray
 Direction = str | Mapping[str, ArrayLike]
@@ -193,3 +195,19 @@ def by_fabric(read: Callable[[sb.Fabric], float], fabric: sb.Fabric, field: str,
     step = share * (value or 1.0)
     high, low = (read(replace(fabric, **{field: value + sign * step})) for sign in (1.0, -1.0))
     return (high - low) / (2.0 * step)
+
+
+def expect_modes_scale(scene: sb.Scene, field: StiffnessField, q: Array, group: str) -> None:
+    """The modes of a field, at the values q, scale compliances and damping of a group, and no other input."""
+    compiled, names = scene.compiled, list(scene.quantities)
+    values = np.array([scene.quantities[name].value for name in names])
+    plain = compiled.inputs(values)
+    values[[names.index(mode) for mode in field.modes]] = q
+    varied, factor = compiled.inputs(values), np.exp(field.shapes @ q)
+    for array, power in (("compliance", -1.0), ("damping", 1.0)):
+        at, _ = compiled.layout[array]
+        _, first, _ = scene.group(group)
+        own = slice(at + first, at + first + len(factor))
+        assert varied[own] == approx(plain[own] * factor**power)
+        plain[own] = varied[own]
+    assert np.array_equal(plain, varied)

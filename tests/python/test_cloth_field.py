@@ -19,6 +19,7 @@ from sheetbend.fitting.reached import Reached
 from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.search import Search
 from sheetbend.objects.stiffness_field import StiffnessField
+from support import expect_modes_scale
 
 behind = importlib.import_module("sheetbend.fitting.fit")  # the package has the function under this name
 SIDE, WARP, NOISE = 0.3, 20.0, 3e-4
@@ -61,21 +62,8 @@ def test_modes_of_a_square_are_its_waves() -> None:
 
 
 def test_modes_scale_the_membrane_of_each_triangle() -> None:
-    scene, q = hung(3), np.array([0.3, -0.2, 0.1])
-    field, at = field_of(scene), 0
-    compiled, names = scene.compiled, list(scene.quantities)
-    values = np.array([scene.quantities[name].value for name in names])
-    plain = compiled.inputs(values)
-    values[[names.index(mode) for mode in field.modes]] = q
-    varied = compiled.inputs(values)
-    factor = np.exp(field.shapes @ q)
-    for array, power in (("compliance", -1.0), ("damping", 1.0)):
-        at, _ = compiled.layout[array]
-        _, first, _ = scene.group("cloth_membrane")
-        own = slice(at + first, at + first + len(factor))
-        assert varied[own] == pytest.approx(plain[own] * factor**power)
-        plain[own] = varied[own]
-    assert np.array_equal(plain, varied)
+    scene = hung(3)
+    expect_modes_scale(scene, field_of(scene), np.array([0.3, -0.2, 0.1]), "cloth_membrane")
 
 
 def test_the_jacobian_is_that_of_differences() -> None:

@@ -68,6 +68,13 @@ def built(text: str) -> sb.Scene:
     return scene_alone(parsed(text))[0]
 
 
+def expect_refused(text: str, field: str, words: str) -> None:
+    with pytest.raises(sb.ConfigError) as error:
+        built(text)
+    assert error.value.field == field
+    assert words in str(error.value)
+
+
 def test_a_file_builds_the_scene_that_python_builds():
     scene = sb.Scene("dragged", (0, 0, -9.81))
     rope = sb.add_rope(scene, length=0.2, segments=8, density=0.05, EA=200.0, EI=1e-4, start=(0, 0, 0.005))
@@ -144,10 +151,7 @@ def test_a_collider_moves_at_knots_and_with_a_tool(tmp_path: Path):
     ],
 )
 def test_what_cannot_be_is_refused(old: str, new: str, field: str, words: str):
-    with pytest.raises(sb.ConfigError) as error:
-        built(DRAGGED.replace(old, new, 1))
-    assert error.value.field == field
-    assert words in str(error.value)
+    expect_refused(DRAGGED.replace(old, new, 1), field, words)
 
 
 MARBLES = """\
@@ -202,10 +206,7 @@ def test_balls_of_a_configuration_hit_each_other():
     ],
 )
 def test_collisions_that_cannot_be_are_refused(old: str, new: str, field: str, words: str):
-    with pytest.raises(sb.ConfigError) as error:
-        built(MARBLES.replace(old, new, 1))
-    assert error.value.field == field
-    assert words in str(error.value)
+    expect_refused(MARBLES.replace(old, new, 1), field, words)
 
 
 def test_a_tool_that_is_corrected_moves_no_collider(tmp_path: Path):
