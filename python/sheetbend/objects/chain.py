@@ -82,6 +82,24 @@ def add_masses(scene: Scene, name: str, nodes: Array, segments: int) -> None:
     )
 
 
+def check_damping(field: str, damping: float | None, needed: str, stiffness: float | None) -> None:
+    """Refuse damping of what has no stiffness.
+
+    Args:
+        needed: the stiffness in words, such as "a finite EA", whose last word is its argument.
+
+    Raises:
+        SceneError: names the argument `field` of the damping.
+    """
+    if damping is not None and stiffness is None:
+        raise SceneError(field, f"needs {needed}", stiffness, f"give {needed.split()[-1]}, or leave it out")
+
+
+def time_constant(scene: Scene, name: str, kind: str, value: float | None) -> TimeConstant | None:
+    """The new quantity `<name>_<kind>_damping`, s, as a time constant; None where it is not given."""
+    return None if value is None else (1.0, {scene.add_quantity(f"{name}_{kind}_damping", value, "s"): "identity"})
+
+
 def time_constants(
     scene: Scene,
     name: str,
@@ -93,12 +111,8 @@ def time_constants(
     bend: float | None,
 ) -> tuple[TimeConstant | None, TimeConstant | None]:
     """Kelvin-Voigt time constants of stretching and bending, as terms; adds their quantities."""
-
-    def own(kind: str, value: float | None) -> TimeConstant | None:
-        return None if value is None else (1.0, {scene.add_quantity(f"{name}_{kind}_damping", value, "s"): "identity"})
-
     if factor is None and frequency is None:
-        return own("stretch", stretch), own("bend", bend)
+        return time_constant(scene, name, "stretch", stretch), time_constant(scene, name, "bend", bend)
     if factor is None or not is_number(factor) or not factor > 0:
         raise SceneError(f"{name}.loss_factor", "must be positive", factor, "give it together with loss_frequency")
     if frequency is None or not is_number(frequency) or not frequency > 0:

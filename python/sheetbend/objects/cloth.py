@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from ..mesh import TriangleMesh
 from ..quantities.quantities import Term
 from ..scene.given import check_scene
 from ..scene.scene import Array, Scene
-from .cloth_cut import Bending, Cut, Stretching
+from .cloth_cut import Cut
 from .flat_size import FlatSize
 from .hinges import Hinges
 from .laws import Law, Linear
@@ -180,18 +181,10 @@ def add_cloth(
     if not isinstance(law, Law | None):
         raise SceneError(f"{name}.law", "is no law", law, "give such as sb.laws.Sinh(warp, weft, shear)")
     needed = {"density": density, "warp": warp, "shear": shear}
-    optional = {
-        "weft": weft,
-        "bending": bending,
-        "bending_weft": bending_weft,
-        "bending_twist": bending_twist,
-        "membrane_damping": membrane_damping,
-        "bend_damping": bend_damping,
-        "yield_curvature": yield_curvature,
-        "yield_shear": yield_shear,
-        "drag_linear": drag_linear,
-        "drag_quadratic": drag_quadratic,
-    }
+    optional = {"weft": weft, "bending": bending, "bending_weft": bending_weft, "bending_twist": bending_twist}
+    optional |= {"membrane_damping": membrane_damping, "bend_damping": bend_damping}
+    optional |= {"yield_curvature": yield_curvature, "yield_shear": yield_shear}
+    optional |= {"drag_linear": drag_linear, "drag_quadratic": drag_quadratic}
     check_positive(name, needed, optional)
     fabric = fabric or name
     check_yield(name, yield_curvature, yield_share, "the bending stiffness")
@@ -200,30 +193,25 @@ def add_cloth(
     numbers = needed | optional | named | {"yield_share": yield_share, "yield_shear_share": yield_shear_share}
     _check_cut(scene, name, fabric, numbers)
     _check_together(name, numbers)
-    shape = (
-        mesh.vertices if positions is None else finite(f"{name}.positions", positions, mesh.vertices.shape, SceneError)
-    )
+    check = partial(finite, shape=mesh.vertices.shape, error=SceneError)
+    shape = mesh.vertices if positions is None else check(f"{name}.positions", positions)
     free = np.ones(len(shape), dtype=bool)
     free[some_indices(f"{name}.held", held, len(shape))] = False
+    speeds = None if velocity is None else check(f"{name}.velocity", velocity)
 
-    speeds = None if velocity is None else finite(f"{name}.velocity", velocity, shape.shape, SceneError)
     particles = scene.add_particles(shape, 0.0, speeds)
     size = FlatSize.add(scene, mesh, name, warp_size, weft_size, None if bending is None else bending_model)
-    cut = Cut(scene, mesh, name, fabric, particles, size)
-    _weigh(cut, density, drag_linear, drag_quadratic)
+    cut = Cut(scene, mesh, name, fabric, particles, size, numbers)
+    _weigh(cut)
     kept = np.flatnonzero(free[mesh.triangles].any(axis=1))
-    varying = None
     check_count(f"{name}.stiffness_modes", stiffness_modes, 0, len(mesh.triangles))
+    varying = None
     if stiffness_modes:
         varying = field_of_triangles(scene, mesh, name, f"{fabric}_warp", stiffness_modes, kept)
-    slides = None if yield_shear is None or yield_shear_share is None else (yield_shear, yield_shear_share)
-    stretches = Stretching(warp, weft, shear, poisson, law or Linear(), membrane_damping, slides)
-    add_membrane(cut, kept, stretches, varying)
+    add_membrane(cut, kept, varying)
     if bending is not None:
-        yields = None if yield_curvature is None or yield_share is None else (yield_curvature, yield_share)
-        bends = Bending(bending, bending_model, bending_weft, bending_twist, curved, bend_damping, yields)
-        sheet: SheetCurvature | Hinges = SheetCurvature(mesh, free) if bends.of_curvature else Hinges(mesh, free)
-        sheet.add(cut, bends)
+        sheet = SheetCurvature(mesh, free) if bending_model == "curvature" else Hinges(mesh, free)
+        sheet.add(cut, curved)
     built = Cloth(name, mesh, particles, fabric, numbers, {"warp_size": warp_size, "weft_size": weft_size}, varying)
     scene.cloths[name] = built
     return built
@@ -259,15 +247,16 @@ def _check_together(name: str, numbers: Mapping[str, Any]) -> None:
         raise SceneError(f"{name}.yield_shear", "belongs to the linear law", numbers["yield_shear"], fix)
 
 
-def _weigh(cut: Cut, density: float, linear: float | None, quadratic: float | None) -> None:
+def _weigh(cut: Cut) -> None:
     """Masses and drag: every vertex has a third of its triangles."""
-    scene, mesh, fabric = cut.scene, cut.mesh, cut.fabric
+    scene, mesh = cut.scene, cut.mesh
     share = np.bincount(mesh.triangles.ravel(), np.repeat(mesh.areas / 3.0, 3), len(mesh.vertices))
-    area = cut.size.power(1, 1)
-    scene.add_quantity(f"{fabric}_density", density, "kg/m^2", shared=True)
-    scene.add_terms([Term("mass", cut.particles, share, ((f"{fabric}_density", "identity"), *area))])
-    for kind, value, unit in (("linear", linear, "N s/m^3"), ("quadratic", quadratic, "N s^2/m^4")):
-        if value is not None:
-            scene.has_drag = True
-            quantity = scene.add_quantity(f"{fabric}_drag_{kind}", value, unit, shared=True)
-            scene.add_terms([Term(f"drag_{kind}", cut.particles, share, ((quantity, "identity"), *area))])
+    for array, label, unit in (
+        ("mass", "density", "kg/m^2"),
+        ("drag_linear", "drag_linear", "N s/m^3"),
+        ("drag_quadratic", "drag_quadratic", "N s^2/m^4"),
+    ):
+        if (value := cut.numbers[label]) is not None:
+            scene.has_drag |= array != "mass"
+            quantity = scene.add_quantity(f"{cut.fabric}_{label}", value, unit, shared=True)
+            scene.add_terms([Term(array, cut.particles, share, ((quantity, "identity"), *cut.size.power(1, 1)))])

@@ -7,7 +7,7 @@ import numpy as np
 from ..errors import SceneError
 from ..mesh import TriangleMesh
 from ..scene.scene import Array
-from .cloth_cut import Bending, Cut
+from .cloth_cut import Cut
 from .elastic_group import add_elastic_group
 
 
@@ -45,35 +45,36 @@ class Hinges:
         k = np.stack([at_0[0] + at_0[1], -at_0[0] - at_1[0], -at_0[1] - at_1[1]], axis=1)
         return k / np.sqrt(self.area)[:, None]
 
-    def add(self, cut: Cut, bending: Bending) -> None:
+    def add(self, cut: Cut, curved: bool) -> None:
         """Add them to the cut's scene as the group `<name>_bend`, with the quantity `<fabric>_bending` (B, N m).
 
         Raises:
             SceneError: a mesh with one-way diagonals, or a curved rest shape of quadratic bending.
         """
+        model, bending = cut.numbers["bending_model"], cut.numbers["bending"]
         if self.mesh.one_way_diagonals:
             why = f"bend {self.mesh.diagonal_bias:.1f} times as hard in one direction as in another on this mesh"
             fix = "use the curvature model, or an equilateral mesh"
-            raise SceneError(f"{cut.name}.bending", why, bending.rigidity, fix)
-        dihedral = bending.model == "dihedral"
-        if bending.curved and not dihedral:
+            raise SceneError(f"{cut.name}.bending", why, bending, fix)
+        dihedral = model == "dihedral"
+        if curved and not dihedral:
             fix = "use the dihedral model"
             raise SceneError(f"{cut.name}.curved", "is not possible for quadratic bending, flat at rest", True, fix)
         count = len(self.stencils)
         if dihedral:
             scale = self.length**2 / self.area
-            rest = rest_angles(self.mesh, self.stencils) if bending.curved else np.zeros(count)
+            rest = rest_angles(self.mesh, self.stencils) if curved else np.zeros(count)
         else:
             scale, rest = np.ones(count), self._cotangents()
         add_elastic_group(
             cut.scene,
-            bending.model,
+            model,
             cut.particles[self.stencils],
             name=f"{cut.name}_bend",
             rest=rest,
             scale=scale,
-            stiffness=(f"{cut.fabric}_bending", bending.rigidity, "N m"),
-            damping=(f"{cut.fabric}_bend_damping", bending.damping),
+            stiffness=(f"{cut.fabric}_bending", bending, "N m"),
+            damping=(f"{cut.fabric}_bend_damping", cut.numbers["bend_damping"]),
         )
 
 

@@ -16,7 +16,7 @@ from ..scene.body import BodyPoint
 from ..scene.given import check_scene
 from ..scene.scene import Array, Scene
 from .along_rope import softness_field
-from .chain import MOST_LINKS, add_drag, add_links, add_masses
+from .chain import MOST_LINKS, add_drag, add_links, add_masses, check_damping, time_constant
 from .grip import Grip
 from .grip_freedom import spread_shift
 from .rod_end import End, check_roll, spread_roll
@@ -165,47 +165,32 @@ def add_rod(
     Raises:
         SceneError: wrong or missing values; the message names the field.
     """
-    check_positive(
-        name,
-        {"length": length, "density": density, "EI": EI, "GJ": GJ},
-        {
-            "EA": EA,
-            "GA": GA,
-            "EI2": EI2,
-            "stretch_damping": stretch_damping,
-            "bend_damping": bend_damping,
-            "twist_damping": twist_damping,
-            "shear_damping": shear_damping,
-            "yield_curvature": yield_curvature,
-        },
-    )
+    needed = {"length": length, "density": density, "EI": EI, "GJ": GJ}
+    damping = {"stretch_damping": stretch_damping, "bend_damping": bend_damping}
+    damping |= {"twist_damping": twist_damping, "shear_damping": shear_damping}
+    optional = {"EA": EA, "GA": GA, "EI2": EI2, **damping, "yield_curvature": yield_curvature}
+    check_positive(name, needed, optional)
     check_yield(name, yield_curvature, yield_share, "EI")
     check_label("rod.name", name)
     check_scene(scene)
     check_count(f"{name}.segments", segments, 2, MOST_LINKS)
     check_count(f"{name}.turns", turns, -MOST_LINKS, MOST_LINKS)
-    for label, damping, of, stiffness in (("stretch", stretch_damping, "EA", EA), ("shear", shear_damping, "GA", GA)):
-        if damping is not None and stiffness is None:
-            fix = f"give {of}, or leave it out"
-            raise SceneError(f"{name}.{label}_damping", f"needs a finite {of}", stiffness, fix)
+    check_damping(f"{name}.stretch_damping", stretch_damping, "a finite EA", EA)
+    check_damping(f"{name}.shear_damping", shear_damping, "a finite GA", GA)
     ends = End(name, "start", -1.0, start), End(name, "end", 1.0, end)
     _check_grips(name, ends, tilts, shifts, roll)
     ring = _is_ring(name, ends, points, length)
     check_roll(name, hold_roll, [e.label for e in ends if e.held])
 
-    shape, speeds = initial_shape(
-        name, length, segments, points, velocity, [e.place(scene) for e in ends], EA is not None
-    )
+    held = [e.place(scene) for e in ends]
+    shape, speeds = initial_shape(name, length, segments, points, velocity, held, EA is not None)
     nodes = _add_nodes(scene, ends, shape, speeds, ring)
     line = Line(name, nodes, shape, length / segments, ring)
     scene.add_quantity(f"{name}_length", length, "m")
     scene.add_quantity(f"{name}_density", density, "kg/m")
     add_masses(scene, name, nodes, segments)
     weigh(scene, name, nodes, segments, density_modes)
-    stretch = None
-    if stretch_damping is not None:
-        stretch = (1.0, {scene.add_quantity(f"{name}_stretch_damping", stretch_damping, "s"): "identity"})
-    add_links(scene, name, nodes, line.link, EA, stretch)
+    add_links(scene, name, nodes, line.link, EA, time_constant(scene, name, "stretch", stretch_damping))
 
     frames = add_frames(scene, line, ends, director, turns, GA is not None, STUB_MASS * density * line.link)
     scene.add_quantity(f"{name}_GJ", GJ, "N m^2")

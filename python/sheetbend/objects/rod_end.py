@@ -18,7 +18,7 @@ from .body_end import frame_at, hold_direction, hold_place
 from .grip import Grip
 from .grip_freedom import add_motion, add_shifts, add_tilts, axes_of
 from .rod_junction import STUB, Facing, Junction
-from .rope import GHOST
+from .rope_grips import GHOST, placed
 
 SERIES = 9  # powers of the roll in a start's frames: at half a turn they are off by 0.03 rad
 
@@ -50,11 +50,8 @@ class End:
 
     def place(self, scene: Scene) -> tuple[Array, Array] | None:
         """Place and direction (3,) that a grip or a junction's earlier rods give."""
-        if self.grip is not None:
-            return self.grip.position[0], self.grip.direction[0]
-        if self.point is not None:
-            at, along = self.point.at_start()
-            return at, np.array([1.0, 0.0, 0.0]) if along is None else along
+        if (given := self.grip or self.point) is not None:
+            return placed(given)
         node = self.shared_node(scene)
         if self.way is None or node is None:
             return None

@@ -11,15 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_positive, some_indices
-from ..errors import SceneError
 from ..scene.body import BodyPoint
 from ..scene.given import check_scene
 from ..scene.scene import Array, Scene
-from .body_end import STUB
 from .chain import (
     add_drag,
     add_links,
     add_masses,
+    check_damping,
     straight_or_given,
     straight_way,
     time_constants,
@@ -27,11 +26,9 @@ from .chain import (
 )
 from .grip import Grip
 from .rod_shape import initial_shape
-from .rope_grips import checked_grips, clamp, hold, lengthen, loosen, placed, ride
-from .rope_joints import add_joints, check_set
+from .rope_grips import checked_ends, placed
+from .rope_joints import add_joints, check_modes
 from .stiffness_field import StiffnessField
-
-GHOST = 0.01  # length of a clamp's ghost link over a rope's link; only its direction matters
 
 
 @dataclass(frozen=True)
@@ -175,64 +172,35 @@ def add_rope(
     check_scene(scene)
     way = straight_way(direction, clamp_start, clamp_end)
     shape, length = straight_or_given(name, length, segments, start, way, points)
-    grips = checked_grips(name, (grip_start, grip_end), (clamp_start, clamp_end))
-    gripped = [isinstance(grip, Grip) for grip in grips]
-    for field, asked, possible in (
-        ("tilts", tilts, any(gripped)),
-        ("shifts", shifts, any(gripped)),
-        ("start_lead", start_lead, gripped[0]),
-        ("end_lead", end_lead, gripped[1]),
-    ):
-        if asked is not None and asked is not False and not possible:
-            raise SceneError(f"{name}.{field}", "needs a grip", asked, "give grip_start or grip_end")
+    grips, clamps, leads = (grip_start, grip_end), (clamp_start, clamp_end), (start_lead, end_lead)
+    ends = checked_ends(name, grips, clamps, leads, tilts, shifts)
     speeds = None
     if velocity is not None or any(grips):
         held = [None if grip is None else placed(grip) for grip in grips]
-        line = shape if points is None and grips[0] is None else points
+        line = shape if points is None and grip_start is None else points
         shape, speeds = initial_shape(name, length, segments, line, velocity, held, EA is not None)
     optional = {"EA": EA, "EI": EI, "stretch_damping": stretch_damping, "bend_damping": bend_damping}
     check_positive(name, {"density": density}, optional)
-    if stretch_damping is not None and EA is None:
-        raise SceneError(f"{name}.stretch_damping", "needs a finite EA", EA, "give EA, or leave it out")
-    if bend_damping is not None and EI is None:
-        raise SceneError(f"{name}.bend_damping", "needs EI", EI, "give EI, or leave it out")
+    check_damping(f"{name}.stretch_damping", stretch_damping, "a finite EA", EA)
+    check_damping(f"{name}.bend_damping", bend_damping, "EI", EI)
     normal = None if plane is None else unit_vector(f"{name}.plane", plane)
-    if normal is None and (clamp_angles or len(set_modes)):
-        raise SceneError(
-            f"{name}.plane", "is missing", None, "give the unit normal that the clamp angles or the set turn about"
-        )
-    check_set(name, set_modes, EI)
-    if EI is None and np.size(softness_modes):
-        raise SceneError(f"{name}.softness_modes", "need EI", EI, "give EI, or leave them out")
+    check_modes(name, EI, normal, set_modes, softness_modes, clamp_angles)
 
     nodes = scene.add_particles(shape, 0.0, speeds)
     link = length / segments
-    arc = link * np.arange(segments + 1)
     scene.add_quantity(f"{name}_length", length, "m")
     scene.add_quantity(f"{name}_density", density, "kg/m")
     taus = time_constants(scene, name, loss_factor, loss_frequency, EA, EI, stretch_damping, bend_damping)
     add_masses(scene, name, nodes, segments)
     add_links(scene, name, nodes, link, EA, taus[0])
-    ghosts = [
-        clamp(scene, name, end, held, int(nodes[k]), side * GHOST * link, normal if clamp_angles else None)
-        if grip is None
-        else ride(scene, grip, f"{name}_{end}", int(nodes[k]), side * STUB * link, GHOST * density * link)
-        if isinstance(grip, BodyPoint)
-        else hold(scene, grip, int(nodes[k]), side * GHOST * link)
-        for end, held, grip, k, side in (
-            ("start", clamp_start, grips[0], 0, -1.0),
-            ("end", clamp_end, grips[1], -1, 1.0),
-        )
-    ]
-    built = Rope(name, nodes, arc, *ghosts)
+    turned_about = normal if clamp_angles else None
+    ghosts = [e.hold(scene, int(nodes[k]), link, density, turned_about) for e, k in zip(ends, (0, -1), strict=True)]
+    built = Rope(name, nodes, link * np.arange(segments + 1), *ghosts)
     if EI is not None:
         varying = add_joints(scene, built, EI, taus[1], normal, set_modes, softness_modes)
         built = replace(built, field=varying)
     add_drag(scene, name, nodes, segments, drag_linear, drag_quadratic)
     scene.ropes[name] = built
-    for end, grip, ghost, lead in zip(("start", "end"), grips, ghosts, (start_lead, end_lead), strict=True):
-        if isinstance(grip, Grip) and ghost is not None:
-            loosen(scene, built, end, grip, ghost, GHOST * link, tilts, shifts)
-            if lead is not None:
-                lengthen(scene, built, end, grip, ghost, lead, taus)
+    for e in ends:
+        e.loosen(scene, built, tilts, shifts, taus)
     return built

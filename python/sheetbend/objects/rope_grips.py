@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,12 +12,12 @@ from ..quantities.quantities import product
 from ..scene.body import BodyPoint
 from ..scene.in_frame import drive_in_frame
 from ..scene.scene import Array, Scene
-from .body_end import hold_place
+from .body_end import STUB, hold_place
 from .chain import TimeConstant, first_value, unit_vector, voronoi_shares
 from .grip import Grip
 from .grip_freedom import Lead, add_shifts, add_tilts, spread_shift
 
-End = Grip | BodyPoint | None
+GHOST = 0.01  # length of a clamp's ghost link over a rope's link; only its direction matters
 
 
 class Chain(Protocol):
@@ -35,18 +35,84 @@ class Chain(Protocol):
     def end_ghost(self) -> int | None: ...
 
 
-def checked_grips(
-    name: str, grips: tuple[End, End], clamps: tuple[ArrayLike | None, ArrayLike | None]
+class End(NamedTuple):
+    """One end of a rope and what holds it: a clamp, a grip, a point of a body, or nothing.
+
+    Attributes:
+        rope: its name.
+        label: "start" or "end".
+        grip: the grip, or the point of a body.
+        clamp: (3,), the rope's direction from start to end.
+        lead: m, to the first marker, where that is not known exactly.
+    """
+
+    rope: str
+    label: str
+    grip: Grip | BodyPoint | None
+    clamp: ArrayLike | None
+    lead: float | None
+
+    def hold(self, scene: Scene, node: int, link: float, density: float, normal: Array | None) -> int | None:
+        """Hold the end, and its direction by a ghost, whose number this returns; a clamp turns about a normal (3,)."""
+        label, side = f"{self.rope}_{self.label}", -1.0 if self.label == "start" else 1.0
+        if isinstance(self.grip, BodyPoint):
+            return _ride(scene, self.grip, label, node, side * STUB * link, GHOST * density * link)
+        if self.grip is not None:
+            return _hold(scene, self.grip, node, side * GHOST * link)
+        if self.clamp is None:
+            return None
+        along = unit_vector(f"{self.rope}.clamp_{self.label}", self.clamp)
+        return _clamp(scene, label, along, node, side * GHOST * link, normal)
+
+    def loosen(
+        self,
+        scene: Scene,
+        rope: Chain,
+        tilts: bool,
+        shifts: bool,
+        taus: tuple[TimeConstant | None, TimeConstant | None],
+    ) -> None:
+        """Let a grip be askew, beside its place, or farther from the first marker."""
+        ghost = rope.start_ghost if self.label == "start" else rope.end_ghost
+        if not isinstance(self.grip, Grip) or ghost is None:
+            return
+        _loosen(scene, rope, self.label, self.grip, ghost, tilts, shifts)
+        if self.lead is not None:
+            _lengthen(scene, rope, self.label, self.grip, ghost, self.lead, taus)
+
+
+def checked_ends(
+    name: str,
+    grips: tuple[Grip | BodyPoint | None, Grip | BodyPoint | None],
+    clamps: tuple[ArrayLike | None, ArrayLike | None],
+    leads: tuple[float | None, float | None],
+    tilts: bool,
+    shifts: bool,
 ) -> tuple[End, End]:
-    """The grips of a start and an end, of which none stands beside a clamp."""
-    for end, grip, clamp in zip(("start", "end"), grips, clamps, strict=True):
-        if grip is not None and not isinstance(grip, Grip | BodyPoint):
+    """The start and the end of a rope.
+
+    Raises:
+        SceneError: what is no grip, a grip beside a clamp, and freedoms of a grip where there is none.
+    """
+    start, end = (End(name, *given) for given in zip(("start", "end"), grips, clamps, leads, strict=True))
+    for e in (start, end):
+        field = f"{name}.grip_{e.label}"
+        if e.grip is not None and not isinstance(e.grip, Grip | BodyPoint):
             fix = "give sb.Grip.fixed, from_poses, from_markers or from_body, or a point of a body"
-            raise SceneError(f"{name}.grip_{end}", "is no grip", grip, fix)
-        if grip is not None and clamp is not None:
+            raise SceneError(field, "is no grip", e.grip, fix)
+        if e.grip is not None and e.clamp is not None:
             fix = "leave one of them out: a grip gives the direction"
-            raise SceneError(f"{name}.grip_{end}", f"stands beside clamp_{end}", clamp, fix)
-    return grips
+            raise SceneError(field, f"stands beside clamp_{e.label}", e.clamp, fix)
+    first, last = (isinstance(e.grip, Grip) for e in (start, end))
+    for field, asked, possible in (
+        ("tilts", tilts or None, first or last),
+        ("shifts", shifts or None, first or last),
+        ("start_lead", start.lead, first),
+        ("end_lead", end.lead, last),
+    ):
+        if asked is not None and not possible:
+            raise SceneError(f"{name}.{field}", "needs a grip", asked, "give grip_start or grip_end")
+    return start, end
 
 
 def placed(grip: Grip | BodyPoint) -> tuple[Array, Array]:
@@ -57,7 +123,7 @@ def placed(grip: Grip | BodyPoint) -> tuple[Array, Array]:
     return at, np.array([1.0, 0.0, 0.0]) if along is None else along
 
 
-def hold(scene: Scene, grip: Grip, node: int, reach: float) -> int:
+def _hold(scene: Scene, grip: Grip, node: int, reach: float) -> int:
     """Give an end the place and the direction of a grip, by a ghost particle `reach` m along the rope from it."""
     ghost = int(scene.add_hidden([grip.position[0] + reach * grip.direction[0]], 1.0)[0])
     if grip.stays:
@@ -68,26 +134,14 @@ def hold(scene: Scene, grip: Grip, node: int, reach: float) -> int:
     return ghost
 
 
-def clamp(
-    scene: Scene, name: str, end: str, direction: ArrayLike | None, node: int, reach: float, normal: Array | None
-) -> int | None:
-    """Pin an end and hold its direction of travel by a ghost, a hidden node `reach` m along the rope from it.
-
-    Args:
-        name: of the rope.
-        end: "start" or "end".
-        direction: (3,), from start to end; None = not clamped.
-        node: the end.
-        normal: (3,) about which the new quantity `<name>_<end>_angle` turns the clamp; None = no such quantity.
-    """
-    if direction is None:
-        return None
-    along = unit_vector(f"{name}.clamp_{end}", direction)
+def _clamp(scene: Scene, end: str, along: Array, node: int, reach: float, normal: Array | None) -> int:
+    """Pin an end and hold its direction of travel by a ghost, a hidden node `reach` m along the rope from it. The new
+    quantity `<end>_angle` turns it about `normal`, if that is given."""
     ghost = int(scene.add_hidden([scene.nodes[node] + reach * along], 1.0, pinned=True)[0])
     scene.pin([node])
     if normal is None:
         return ghost
-    angle = scene.add_quantity(f"{name}_{end}_angle", 0.0, "rad", positive=False, scale=0.1)
+    angle = scene.add_quantity(f"{end}_angle", 0.0, "rad", positive=False, scale=0.1)
     across = np.cross(normal, along)
     scene.add_terms(
         [product("position", 3 * ghost + k, reach * along[k], {angle: "cos"}) for k in range(3)]
@@ -97,7 +151,7 @@ def clamp(
     return ghost
 
 
-def ride(scene: Scene, point: BodyPoint, name: str, node: int, reach: float, mass: float) -> int | None:
+def _ride(scene: Scene, point: BodyPoint, name: str, node: int, reach: float, mass: float) -> int | None:
     """Keep an end on a body, and where the point has a direction, a light ghost `reach` m along it."""
     hold_place(scene, point, node, f"{name}_on_{point.body.name}")
     if point.along is None:
@@ -108,14 +162,12 @@ def ride(scene: Scene, point: BodyPoint, name: str, node: int, reach: float, mas
     return ghost
 
 
-def loosen(
-    scene: Scene, rope: Chain, end: str, grip: Grip, ghost: int, reach: float, tilts: bool, shifts: bool
-) -> None:
-    """Let a grip, whose ghost is `reach` m beyond the end, be askew, or beside its place."""
+def _loosen(scene: Scene, rope: Chain, end: str, grip: Grip, ghost: int, tilts: bool, shifts: bool) -> None:
+    """Let a grip be askew, or beside its place."""
     label = f"{rope.name}_{end}"
     nodes, along = (rope.particles, 1.0) if end == "start" else (rope.particles[::-1], -1.0)
     if tilts:
-        add_tilts(scene, grip, label, ghost, -along * reach)
+        add_tilts(scene, grip, label, ghost, -along * GHOST * float(rope.arc_length[1]))
     if shifts:
         add_shifts(scene, grip, label, (int(nodes[0]), ghost))
         other_end = rope.end_ghost if end == "start" else rope.start_ghost
@@ -124,7 +176,7 @@ def loosen(
         spread_shift(scene, grip, label, nodes[between], shares[between])
 
 
-def lengthen(
+def _lengthen(
     scene: Scene,
     rope: Chain,
     end: str,

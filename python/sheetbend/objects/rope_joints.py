@@ -16,12 +16,25 @@ from .rope_grips import Chain
 from .stiffness_field import StiffnessField
 
 
-def check_set(name: str, modes: Sequence[int], EI: float | None) -> None:
-    """Raises SceneError where the modes of a rest curvature are no whole numbers, or nothing bends."""
+def check_modes(
+    name: str,
+    EI: float | None,
+    normal: Array | None,
+    modes: Sequence[int],
+    softness_modes: Sequence[int],
+    clamp_angles: bool,
+) -> None:
+    """Raises SceneError where the modes of a rest curvature are no whole numbers, where nothing bends, and where the
+    normal of the plane is missing that they and angles of clamps turn about."""
+    if normal is None and (clamp_angles or len(modes)):
+        fix = "give the unit normal that the clamp angles or the set turn about"
+        raise SceneError(f"{name}.plane", "is missing", None, fix)
     if not is_list(modes) or any(not is_number(k) or k != int(k) or k < 0 for k in modes):
         raise SceneError(f"{name}.set_modes", "must be whole numbers from 0 on", modes, "give such as (0, 1)")
     if len(modes) and EI is None:
         raise SceneError(f"{name}.set_modes", "need EI", EI, "give EI: a rest curvature acts through bending")
+    if EI is None and np.size(softness_modes):
+        raise SceneError(f"{name}.softness_modes", "need EI", EI, "give EI, or leave them out")
 
 
 def add_joints(

@@ -11,7 +11,7 @@ from ..errors import SceneError
 from ..mesh import TriangleMesh
 from ..quantities.quantities import Term
 from ..scene.scene import Array
-from .cloth_cut import Bending, Cut
+from .cloth_cut import Cut
 from .elastic_group import add_elastic_group
 from .hinges import rest_angles
 
@@ -59,33 +59,34 @@ class SheetCurvature:
         self.matrix = _curvature_matrix(corners, _unfolded(mesh, hinge, side, corners))[kept]
         self.angles = rest_angles(mesh, mesh.hinges)[hinge][kept]
 
-    def add(self, cut: Cut, bends: Bending) -> None:
+    def add(self, cut: Cut, curved: bool) -> None:
         """Add them to the cut's scene as the group `<name>_bend`.
 
         The quantities are `<fabric>_bending`, where given `_bending_weft` and `_bending_twist`, N m, and of what yields
         `<fabric>_yield_curvature`, 1/m, and `_yield_share`. Each triangle that yields has a set, a hidden node, zero at
         first. Another size of the flat cloth leaves angles at rest as they are.
         """
-        scene, name, fabric, yields = cut.scene, cut.name, cut.fabric, bends.yields
+        scene, name, fabric, given = cut.scene, cut.name, cut.fabric, cut.numbers
+        yields = given["yield_curvature"] is not None
         irregular = _irregular(self.mesh)
         if irregular > IRREGULAR:
             warnings.warn(f"{name}: {irregular:.0%} {WEAKER}", UserWarning, stacklevel=3)
         count = len(self.stencils)
-        rest = np.zeros((count, 14 if yields is None else 16))
+        rest = np.zeros((count, 16 if yields else 14))
         rest[:, :9] = self.matrix.reshape(count, 9)
         rest[:, 9:11] = (1.0, np.sqrt(2.0))
-        if bends.curved:
+        if curved:
             rest[:, 11:14] = self.angles
         bending = f"{fabric}_bending"
-        ratios = [(9, bends.weft, f"{bending}_weft", 1.0), (10, bends.twist, f"{bending}_twist", np.sqrt(2.0))]
-        for place, value, _, _ in ratios:
-            if value is not None:
-                rest[:, place] = 0.0
+        ratios = [(9, "bending_weft", 1.0), (10, "bending_twist", np.sqrt(2.0))]
+        ratios = [ratio for ratio in ratios if given[ratio[1]] is not None]
+        for place, _, _ in ratios:
+            rest[:, place] = 0.0
         kind, stencils = "sheet_curvature", cut.particles[self.stencils]
-        if yields is not None:
+        if yields:
             kind = "yielding_sheet_curvature"
             stencils = np.column_stack([stencils, scene.add_hidden(np.zeros((count, 3)), 1.0, pinned=True)])
-            rest[:, 15], rest[:, 14] = yields
+            rest[:, 14:] = given["yield_share"], given["yield_curvature"]
         values = add_elastic_group(
             scene,
             kind,
@@ -93,20 +94,18 @@ class SheetCurvature:
             name=f"{name}_bend",
             rest=rest,
             scale=self.area,
-            stiffness=(bending, bends.rigidity, "N m"),
-            damping=(f"{fabric}_bend_damping", bends.damping),
+            stiffness=(bending, given["bending"], "N m"),
+            damping=(f"{fabric}_bend_damping", given["bend_damping"]),
             size=cut.size,
         )
         cut.size.curvatures(scene, f"{name}_bend", values, self.corners)
-        for place, value, label, factor in ratios:
-            if value is not None:
-                scene.add_quantity(label, value, "N m", shared=True)
-                scene.add_terms([Term("rest", values + place, factor, ((label, "sqrt"), (bending, "inverse_sqrt")))])
-        if yields is not None:
+        for place, label, factor in ratios:
+            rigidity = scene.add_quantity(f"{fabric}_{label}", given[label], "N m", shared=True)
+            scene.add_terms([Term("rest", values + place, factor, ((rigidity, "sqrt"), (bending, "inverse_sqrt")))])
+        if yields:
             scene.group(f"{name}_bend")[0].rest[:, 14:] = 0.0
-            of_yield = ((14, "yield_share", yields[1], ""), (15, "yield_curvature", yields[0], "1/m"))
-            for place, label, value, unit in of_yield:
-                quantity = scene.add_quantity(f"{fabric}_{label}", value, unit, shared=True)
+            for place, label, unit in ((14, "yield_share", ""), (15, "yield_curvature", "1/m")):
+                quantity = scene.add_quantity(f"{fabric}_{label}", given[label], unit, shared=True)
                 scene.add_terms([Term("rest", values + place, 1.0, ((quantity, "identity"),))])
 
 
