@@ -18,7 +18,7 @@ from ..scene.body import Body
 from ..scene.inertia import Inertia
 from ..scene.scene import Scene
 from .body_schema import GROUND, JOINTS, BodySection, Knots
-from .errors import located
+from .errors import located, of_name
 from .scene_schema import SceneSection
 from .tools import tool_named
 
@@ -81,7 +81,4 @@ def named_body(path: str, name: str, scene: Scene) -> Body:
     Raises:
         ConfigError: there is none of this name.
     """
-    if name not in scene.bodies:
-        fix = f"name one of: {', '.join(scene.bodies) or 'none, add a [[scene.body]]'}"
-        raise ConfigError(path, "is no body of the scene", name, fix)
-    return scene.bodies[name]
+    return of_name(path, "body of the scene", name, scene.bodies, "none, add a [[scene.body]]")

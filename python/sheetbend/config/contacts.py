@@ -17,7 +17,7 @@ from ..scene.colliders import Collider
 from ..scene.scene import Scene
 from .body_schema import BodySection
 from .contact_schema import SHAPES, ColliderSection, ContactSection, arguments
-from .errors import located
+from .errors import located, of_name
 from .scene_schema import SceneSection
 from .solver_schema import SolverSection
 from .tools import tool_named
@@ -64,9 +64,8 @@ def add_contacts(
         if unknown:
             fix = f"use some of: {', '.join([*named, *scene.bodies]) or 'none yet'}"
             raise ConfigError(f"{path}.of", "names no rope, cloth, set of particles or body", unknown, fix)
-        if contact.collider not in colliders:
-            fix = f"name one of: {', '.join(colliders) or 'none, add a [[scene.collider]]'}"
-            raise ConfigError(f"{path}.collider", "is no collider of the scene", contact.collider, fix)
+        none = "none, add a [[scene.collider]]"
+        collider = of_name(f"{path}.collider", "collider of the scene", contact.collider, colliders, none)
         particles = [p for name in contact.touching for p in named.get(name, ())]
         numbers = contact.model_dump(
             include={"friction", "radius", "stiffness", "restitution", "dissipation", "settle"}
@@ -76,7 +75,7 @@ def add_contacts(
             continue
         what = scene.bodies[bodies[0].name] if bodies else particles
         with located(path, f"{contact.name or contact.collider}.contact"):
-            scene.add_contact(what, colliders[contact.collider], name=contact.name, points=points, **numbers)
+            scene.add_contact(what, collider, name=contact.name, points=points, **numbers)
     _add_self_contact(scene, section)
     _add_collisions(scene, section, named)
 

@@ -8,7 +8,7 @@ import types
 import typing
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
@@ -17,6 +17,7 @@ from .other_names import meant
 from .section import AXES, NAME, REFERENCE
 
 Location = Sequence[str | int]
+T = TypeVar("T")
 
 
 def from_validation(error: ValidationError, model: type[BaseModel]) -> ConfigError:
@@ -150,6 +151,20 @@ def located(path: str, prefix: str = "") -> Iterator[None]:
     except InputError as error:
         inner = error.field.removeprefix(f"{prefix}.") if prefix else error.field
         raise ConfigError(path if inner == path else f"{path}.{inner}", error.problem, error.got, error.fix) from error
+
+
+def of_name(path: str, kind: str, name: str | None, known: Mapping[str, T], none: str = "none") -> T:
+    """What has a name, such as a "rope of the scene".
+
+    Args:
+        none: what to do where nothing is known.
+
+    Raises:
+        ConfigError: nothing has this name.
+    """
+    if name is None or name not in known:
+        raise ConfigError(path, f"is no {kind}", name, f"name one of: {', '.join(known) or none}")
+    return known[name]
 
 
 def dotted(path: Location) -> str:

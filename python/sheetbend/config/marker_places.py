@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import ConfigError, RecordingError
-from ..objects.cloth import Cloth
+from ..objects.arm_data import Arm
 from ..objects.markers import Place, between, on_body, on_cloth, on_particle, on_rope, on_solid
 from ..recording.recording import Recording
 from ..recording.recording_checks import marker_indices
@@ -16,13 +16,12 @@ from ..scene.scene import Scene
 from . import schema
 from .bodies import named_body
 from .cloth_markers import places_on_cloths
-from .errors import located
+from .errors import located, of_name
 from .particles import Particles
 from .rope_points import Seats
 from .rope_schema import Rod, Rope
-from .ropes import check_markers, named_rope
+from .ropes import check_markers
 from .scene_schema import SceneSection
-from .solids import named_solid
 
 
 @dataclass(frozen=True)
@@ -119,23 +118,26 @@ def _placed(path: str, marker: schema.Marker, scene: Scene, particles: Particles
     if marker.particle is not None:
         place = on_particle(particles.find(f"{path}.particle", marker.particle))
     elif marker.arm is not None:
-        return _on_arm(path, marker, particles)
+        arm = of_name(f"{path}.arm", "arm of the scene", marker.arm, particles.arms)
+        return _on_arm(path, marker, arm)
     elif marker.body is not None:
         body = named_body(f"{path}.body", marker.body, scene)
         off = np.add(marker.point or np.zeros(3), marker.offset or np.zeros(3))
         return on_body(body, [off])[0]
     elif marker.solid is not None:
         with located(path):
-            return on_solid(named_solid(f"{path}.solid", marker.solid, scene), [marker.place or ()])[0]
+            none = "none, add a [[scene.solid]]"
+            solid = of_name(f"{path}.solid", "solid of the scene", marker.solid, scene.solids, none)
+            return on_solid(solid, [marker.place or ()])[0]
     elif marker.between is not None:
         first, second = (particles.find(f"{path}.between", r) for r in marker.between)
         place = between(first, second, marker.fraction)
     elif marker.material is not None:
         with located(path):
-            (place,) = on_cloth(_cloth(path, marker.cloth, scene), [marker.material])
+            cloth = of_name(f"{path}.cloth", "cloth of the scene", marker.cloth or _only(scene.cloths), scene.cloths)
+            (place,) = on_cloth(cloth, [marker.material])
     else:
-        only = next(iter(scene.ropes)) if len(scene.ropes) == 1 else None
-        rope = named_rope(f"{path}.rope", marker.rope or only, scene)
+        rope = of_name(f"{path}.rope", "rope of the scene", marker.rope or _only(scene.ropes), scene.ropes)
         with located(path):
             place = on_rope(rope, marker.arc_length or 0.0)
     # A zero offset still sets the frame in which offset quantities count.
@@ -160,21 +162,13 @@ def _of_ropes(
     return found
 
 
-def _cloth(path: str, name: str | None, scene: Scene) -> Cloth:
-    wanted = name or (next(iter(scene.cloths)) if len(scene.cloths) == 1 else "")
-    if wanted not in scene.cloths:
-        fix = f"name one of: {', '.join(scene.cloths) or 'none'}"
-        raise ConfigError(f"{path}.cloth", "is no cloth of the scene", name, fix)
-    found: Cloth = scene.cloths[wanted]
-    return found
+def _only(known: Mapping[str, object]) -> str | None:
+    """The name of the only one there is."""
+    return next(iter(known)) if len(known) == 1 else None
 
 
-def _on_arm(path: str, marker: schema.Marker, particles: Particles) -> Place:
-    if marker.arm not in particles.arms:
-        raise ConfigError(
-            f"{path}.arm", "is no arm of the scene", marker.arm, f"name one of: {', '.join(particles.arms) or 'none'}"
-        )
-    place = particles.arms[marker.arm].place(marker.radius or 0.0)
+def _on_arm(path: str, marker: schema.Marker, arm: Arm) -> Place:
+    place = arm.place(marker.radius or 0.0)
     along, *across = marker.offset or (0.0, 0.0, 0.0)
     with located(path):
         return place.with_offset((along + (marker.radius or 0.0), *across), marker.normal)

@@ -30,17 +30,6 @@ _OF_ROPES = {"start", "direction", "clamp_start", "clamp_end"}
 """Keys of a rod that are not arguments of `add_rod`."""
 
 
-def named_rope(path: str, name: str | None, scene: Scene) -> Rope:
-    """A rope or rod of the scene.
-
-    Raises:
-        ConfigError: there is none of this name, or no name.
-    """
-    if name not in scene.ropes:
-        raise ConfigError(path, "is no rope of the scene", name, f"name one of: {', '.join(scene.ropes) or 'none'}")
-    return scene.ropes[name]
-
-
 def build_rope(
     scene: Scene,
     path: str,

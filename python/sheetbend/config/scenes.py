@@ -22,7 +22,7 @@ from .bodies import add_bodies, named_body
 from .cloth_markers import seats
 from .cloths import build_cloth, placed_mesh
 from .contacts import add_contacts
-from .errors import located
+from .errors import located, of_name
 from .forces_on import add_forces
 from .moment import Moment
 from .particles import Particles
@@ -189,14 +189,7 @@ def _same_length(path: str, stencils: list[list[int]]) -> None:
 def _add_arm(scene: Scene, particles: Particles, path: str, arm: schema.Arm | schema.Pendulum) -> None:
     pivot: Arm | list[float]
     if isinstance(arm.pivot, str):
-        if arm.pivot not in particles.arms:
-            raise ConfigError(
-                f"{path}.pivot",
-                "is no arm before this one",
-                arm.pivot,
-                f"name one of: {', '.join(particles.arms) or 'none yet'}",
-            )
-        pivot = particles.arms[arm.pivot]
+        pivot = of_name(f"{path}.pivot", "arm before this one", arm.pivot, particles.arms, "none yet")
     else:
         pivot = arm.pivot
     fields = arm.model_dump(exclude={"name", "pivot"}, exclude_none=True)

@@ -63,16 +63,3 @@ def _members(path: str, mesh: SolidMesh, name: str) -> np.ndarray:
     if name not in mesh.sets:
         raise ConfigError(path, "is no set of the solid", name, f"use one of: {', '.join(mesh.sets) or 'none'}")
     return mesh.sets[name]
-
-
-def named_solid(path: str, name: str | None, scene: Scene) -> Solid:
-    """A solid of the scene.
-
-    Raises:
-        ConfigError: there is none of this name.
-    """
-    if name not in scene.solids:
-        fix = f"name one of: {', '.join(scene.solids) or 'none, add a [[scene.solid]]'}"
-        raise ConfigError(path, "is no solid of the scene", name, fix)
-    found: Solid = scene.solids[name]
-    return found

@@ -13,7 +13,7 @@ from ..objects.hand_eye import HandEye
 from ..objects.tool import Tool
 from ..recording.recording import Recording
 from . import scene_schema as schema
-from .errors import located
+from .errors import located, of_name
 
 BEYOND = 1.0  # s of poses that are kept behind the last frame
 SHORT = 2.0  # frame intervals by which a log of poses may end before the recording: the clocks need not agree
@@ -41,9 +41,7 @@ def tools_of(
     """
     known = {tool.name: i for i, tool in enumerate(section.tool)}
     for name in own:
-        if name not in known:
-            fix = f"name one of: {', '.join(known) or 'none, add a [[scene.tool]]'}"
-            raise ConfigError(f"{path}.tools.{name}", "is no tool of the scene", name, fix)
+        of_name(f"{path}.tools.{name}", "tool of the scene", name, known, "none, add a [[scene.tool]]")
     found = {}
     for tool in section.tool:
         file, where = own.get(tool.name, tool.file), f"scene.tool[{known[tool.name]}].file"
@@ -72,10 +70,7 @@ def tool_named(path: str, name: str, tools: Mapping[str, Tool]) -> Tool:
     Raises:
         ConfigError: there is none of that name.
     """
-    if name not in tools:
-        fix = f"name one of: {', '.join(tools) or 'none, add a [[scene.tool]]'}"
-        raise ConfigError(path, "is no tool of the scene", name, fix)
-    return tools[name]
+    return of_name(path, "tool of the scene", name, tools, "none, add a [[scene.tool]]")
 
 
 def with_corrections(config: dict[str, Any]) -> dict[str, Any]:

@@ -9,9 +9,8 @@ from ..objects.rope import Rope
 from ..scene.body import BodyPoint
 from ..scene.scene import Scene
 from .bodies import named_body
-from .errors import located
+from .errors import located, of_name
 from .moment import Moment
-from .ropes import named_rope
 from .scene_schema import SceneSection, UnknownForce, UnknownWind
 
 
@@ -35,7 +34,7 @@ def add_unknown_inputs(
         if force.body is not None:
             on = named_body(f"{path}.body", force.body, scene).point(force.point)
         elif force.rope is not None:
-            on = named_rope(f"{path}.rope", force.rope, scene)
+            on = of_name(f"{path}.rope", "rope of the scene", force.rope, scene.ropes)
         else:
             on = [find(f"{path}.particles", r) for r in force.particles]
         with located(path, force.name):
