@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays.timeseries import Array
-from ..objects.chain import first_value
 from ..objects.rod import Rod
 from ..quantities.wording import short
+from ..scene.group import places_in_rest
 from ..scene.scene import Scene
 from .tangents import Input
 
@@ -69,10 +69,9 @@ def _ratio(
     known = {g.name: g for g in scene.groups}
     if f"{prefix}_{second}" in scene.quantities or f"{prefix}_{first}" not in scene.quantities or group not in known:
         return
-    count, width = known[group].rest.shape
-    if place >= width or (place > 8 and "sheet_curvature" not in known[group].kind):
+    if place >= known[group].rest.shape[1] or (place > 8 and "sheet_curvature" not in known[group].kind):
         return
-    at = first_value(scene, group) + width * np.arange(count) + place
+    at = places_in_rest(scene.groups, group)[:, place]
     values = inputs[scene.compiled.layout["rest"][0] + at]
 
     def says(size: float) -> str:

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from ..arrays.checks import check_count, check_label, finite, is_number, points
 from ..errors import SceneError
 from ..quantities.quantities import ZERO_OR_MORE, product
+from ..scene.group import places_in_rest
 from ..scene.scene import Array, Scene
 
 MOST_LINKS = 10**6
@@ -144,10 +145,10 @@ def add_links(
         damping=None if damping is None else np.zeros(segments),
     )
     _, first, _ = scene.group(group)
-    offset = first_value(scene, group)
     scene.groups[-1].rest[:] = 0.0
     length = f"{name}_length"
-    terms = [product("rest", offset + i, 1.0 / segments, {length: "identity"}) for i in range(segments)]
+    rest = places_in_rest(scene.groups, group).ravel()
+    terms = [product("rest", at, 1.0 / segments, {length: "identity"}) for at in rest]
     if EA is not None:
         scene.add_quantity(f"{name}_EA", EA, "N")
         terms += [
@@ -179,13 +180,3 @@ def add_drag(
                 for n, share in zip(nodes, voronoi_shares(segments), strict=True)
             ]
         )
-
-
-def first_value(scene: Scene, group: str) -> int:
-    """The entry of the input array "rest" at which the parameters of a group's constraints begin."""
-    start = 0
-    for g in scene.groups:
-        if g.name == group:
-            return start
-        start += g.rest.size
-    raise KeyError(group)

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..quantities.quantities import Term
+from ..scene.group import places_in_rest
 from ..scene.scene import Array, Scene
-from .chain import first_value
 from .flat_size import AS_MESH, FlatSize
 
 
@@ -38,7 +38,7 @@ def add_elastic_group(
         varies: quantities and their weights (count,), whose sum is added to the logarithm of the stiffness of each.
 
     Returns:
-        (count,) where each constraint's own parameters start in the input array "rest".
+        (count, parameters) where the constraints' own parameters stand in the input array "rest".
     """
     count = len(stencils)
     quantity, value, unit = stiffness
@@ -51,7 +51,7 @@ def add_elastic_group(
         damping=None if constant is None else np.zeros(count),
         rest=rest,
     )
-    group, first, _ = scene.group(name)
+    _, first, _ = scene.group(name)
     at = first + np.arange(count)
     scene.add_quantity(quantity, value, unit, shared=True)
     less = tuple((mode, -weight) for mode, weight in varies)
@@ -60,5 +60,4 @@ def add_elastic_group(
         scene.add_quantity(label, constant, "s", shared=True)
         factors = ((label, "identity"), (quantity, "identity"), *size.power(1, 1))
         scene.add_terms([Term("damping", at, scale, factors, tuple(varies))])
-    values: Array = first_value(scene, name) + group.rest.shape[1] * np.arange(count)
-    return values
+    return places_in_rest(scene.groups, name)

@@ -69,7 +69,7 @@ class FlatSize(NamedTuple):
 
     def strains(self, scene: Scene, group: str, values: Array) -> None:
         """Make the gradients of shape functions (dN_1/du, dN_1/dv, dN_2/du, dN_2/dv), first in `rest` of a group whose
-        parameters start at `values`, follow the sizes."""
+        parameters stand at `values`, follow the sizes."""
         for places, factors in (((0, 2), self.power(-1, 0)), ((1, 3), self.power(0, -1))):
             if factors:
                 for place in places:
@@ -89,7 +89,7 @@ class FlatSize(NamedTuple):
                 rest[:, place] = 0.0
                 scene.add_terms(
                     [
-                        Term("rest", values + place, own * by[:, edge, k], self.power(u + 1 - m, v + m))
+                        Term("rest", values[:, place], own * by[:, edge, k], self.power(u + 1 - m, v + m))
                         for k, m in enumerate(POWERS)
                     ]
                 )
@@ -118,5 +118,5 @@ def of_edges(edges: Array) -> Array:
 def _move(scene: Scene, group: str, values: Array, place: int, factors: Factors) -> None:
     """Make a column of `rest` a term with factors, which it was without them."""
     rest = scene.group(group)[0].rest
-    scene.add_terms([Term("rest", values + place, rest[:, place].copy(), factors)])
+    scene.add_terms([Term("rest", values[:, place], rest[:, place].copy(), factors)])
     rest[:, place] = 0.0

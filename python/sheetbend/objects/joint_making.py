@@ -14,8 +14,9 @@ from ..quantities.expression import Array, Expression, cross, expressions, names
 from ..quantities.quantities import ZERO_OR_MORE, Term
 from ..scene.body import AXES, GROUND, PLACE, Body, FrameState, HasMotion
 from ..scene.given import check_scene
+from ..scene.group import places_in_rest
 from ..scene.scene import Scene
-from .chain import first_value, unit_vector
+from .chain import unit_vector
 from .grip import any_across
 
 TURN, SPIN, SPEED = 0.1, 1.0, 0.1  # rad, rad/s, m/s: sizes against which precision is judged
@@ -248,5 +249,5 @@ def constrain(
     now = numbers(parameters, {name: scene.quantities[name].value for name in names_in(parameters)})
     given = {"compliance": compliance, "damping": damping, "viscosity": viscosity}
     scene.add_constraints(kind, stencil, name=name, rest=now, **given)
-    index = first_value(scene, name) + np.arange(now.size).reshape(now.shape)
+    index = places_in_rest(scene.groups, name)
     scene.add_terms([t for t in terms_of("rest", index, parameters - now) if np.any(t.coefficient)])

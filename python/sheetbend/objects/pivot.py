@@ -20,9 +20,9 @@ from numpy.typing import ArrayLike
 from ..arrays.checks import is_number
 from ..errors import SceneError
 from ..quantities.quantities import ZERO_OR_MORE, Term
+from ..scene.group import places_in_rest
 from ..scene.scene import Scene
 from .arm_data import Arm
-from .chain import first_value
 
 SLIP_ANGLE = 1e-3
 """How far a joint with dry friction gives before it slides unless told otherwise, rad."""
@@ -81,7 +81,7 @@ def _dry(scene: Scene, arm: Arm, carrier: Arm | None, before: int, friction: flo
     )
     made, first, _ = scene.group(group)
     made.compliance[:] = made.rest[:, -1] = 0.0  # terms make both
-    at = first_value(scene, group) + made.rest.size - 1
+    at = int(places_in_rest(scene.groups, group)[0, -1])
     scene.add_terms([Term("compliance", first, 1.0, (slip, (quantity, "inverse"))), Term("rest", at, 1.0, (slip,))])
 
 

@@ -8,9 +8,10 @@ import numpy as np
 
 from ..errors import SceneError
 from ..quantities.quantities import Term
+from ..scene.group import places_in_rest
 from ..scene.scene import Array, Scene
 from .along_rope import mode_quantities
-from .chain import first_value, voronoi_shares
+from .chain import voronoi_shares
 
 Factors = tuple[tuple[str, str], ...]
 Exponents = tuple[tuple[str, Array], ...]
@@ -32,7 +33,6 @@ class Joints:
         self._share, self._s = voronoi_shares(segments)[place], place / segments
         self._length = f"{name}_length"
         self._ratio: Factors = ()
-        self._rest_of_bend = 0
         self._sets: Array | None = None
 
     def bend(
@@ -58,25 +58,23 @@ class Joints:
         if yield_curvature is not None and yield_share is not None:
             own = np.tile([yield_share, yield_curvature, 0.0, 0.0], (len(stencils), 1))
         self._group("bend", kind, f"{name}_EI", stencils, damping, tuple(softness), own)
-        start, width = first_value(scene, f"{name}_bend"), 3 if yield_curvature is None else 5
-        first = start + width * np.arange(len(stencils))
-        self._rest_of_bend = width - 2
+        places = places_in_rest(scene.groups, f"{name}_bend")
         rest = scene.group(f"{name}_bend")[0].rest
         if EI2 is not None:
             scene.add_quantity(f"{name}_EI2", EI2, "N m^2")
             self._ratio = ((f"{name}_EI2", "sqrt"), (f"{name}_EI", "inverse_sqrt"))
             rest[:, 0] = 0.0
-            scene.add_terms([Term("rest", first, 1.0, self._ratio)])
+            scene.add_terms([Term("rest", places[:, 0], 1.0, self._ratio)])
         if yield_curvature is not None and yield_share is not None:
             scene.add_quantity(f"{name}_yield_share", yield_share, "")
             scene.add_quantity(f"{name}_yield_curvature", yield_curvature, "1/m")
             rest[:, 1:3] = 0.0
             scene.add_terms(
                 [
-                    Term("rest", first + 1, 1.0, ((f"{name}_yield_share", "identity"),)),
+                    Term("rest", places[:, 1], 1.0, ((f"{name}_yield_share", "identity"),)),
                     Term(
                         "rest",
-                        first + 2,
+                        places[:, 2],
                         self._share,
                         ((f"{name}_yield_curvature", "identity"), (self._length, "identity")),
                     ),
@@ -90,13 +88,11 @@ class Joints:
 
     def rest(self, curvature_modes: Sequence[int], twist_modes: Sequence[int]) -> None:
         """Rest curvature and twist in modes cos(k pi s/length)."""
-        bend, twist = (first_value(self._scene, f"{self._name}_{label}") for label in ("bend", "twist"))
-        joints = np.arange(len(self._stencils))
-        curvature = bend + (self._rest_of_bend + 2) * joints + self._rest_of_bend
+        bend, twist = (places_in_rest(self._scene.groups, f"{self._name}_{label}") for label in ("bend", "twist"))
         targets: list[tuple[str, Sequence[int], Array, Factors]] = [
-            ("curvature_1", curvature_modes, curvature, ()),
-            ("curvature_2", curvature_modes, curvature + 1, self._ratio),
-            ("twist", twist_modes, twist + joints, ()),
+            ("curvature_1", curvature_modes, bend[:, -2], ()),
+            ("curvature_2", curvature_modes, bend[:, -1], self._ratio),
+            ("twist", twist_modes, twist[:, 0], ()),
         ]
         for label, modes, index, factors in targets:
             for mode, weights in mode_quantities(self._scene, self._name, label, modes, self._s, "1/m"):

@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike
 from ..errors import SceneError
 from ..quantities.quantities import product
 from ..scene.body import BodyPoint
+from ..scene.group import places_in_rest
 from ..scene.in_frame import drive_in_frame
 from ..scene.scene import Array, Scene
 from .body_end import STUB, hold_place
-from .chain import TimeConstant, first_value, unit_vector, voronoi_shares
+from .chain import TimeConstant, unit_vector, voronoi_shares
 from .grip import Grip
 from .grip_freedom import Lead, add_shifts, add_tilts, spread_shift
 
@@ -192,7 +193,7 @@ def _lengthen(
     lead = Lead(scene, f"{name}_{end}", grip, length, nodes, link)
     lead.hold(ghost, 1.0 if end == "start" else -1.0)
     places, links, nodes = places[: lead.count + 1], links[: lead.count], nodes[: lead.count + 1]
-    lead.lengthen("rest", first_value(scene, f"{name}_stretch") + links, {})
+    lead.lengthen("rest", places_in_rest(scene.groups, f"{name}_stretch")[links, 0], {})
     lead.lengthen("mass", nodes, {f"{name}_density": "identity"})
     for kind in ("linear", "quadratic"):
         if f"{name}_drag_{kind}" in scene.quantities:

@@ -9,9 +9,10 @@ import numpy as np
 from ..arrays.checks import is_list, is_number
 from ..errors import SceneError
 from ..quantities.quantities import Term, product
+from ..scene.group import places_in_rest
 from ..scene.scene import Array, Scene
 from .along_rope import mode_quantities, softness_field
-from .chain import TimeConstant, first_value, voronoi_shares
+from .chain import TimeConstant, voronoi_shares
 from .rope_grips import Chain
 from .stiffness_field import StiffnessField
 
@@ -91,13 +92,13 @@ def add_joints(
         factors = (*tau.items(), (stiffness, "identity"), (length, "inverse"))
         stiffer = tuple((mode, -weights) for mode, weights in softer)
         terms.append(Term("damping", joints, scale / share[at], factors, stiffer))
-    offset = first_value(scene, group)
+    rest = places_in_rest(scene.groups, group)
     for k in modes:
         mode = scene.add_quantity(f"{name}_set_{k}", 0.0, "1/m", positive=False, scale=1.0 / arc[-1])
         terms += [
             product(
                 "rest",
-                offset + 4 * i + 3,
+                rest[i, 3],
                 share[node] * np.cos(k * np.pi * arc[node] / arc[-1]),
                 {length: "identity", mode: "identity"},
             )

@@ -101,12 +101,12 @@ class SheetCurvature:
         cut.size.curvatures(scene, f"{name}_bend", values, self.corners)
         for place, label, factor in ratios:
             rigidity = scene.add_quantity(f"{fabric}_{label}", given[label], "N m", shared=True)
-            scene.add_terms([Term("rest", values + place, factor, ((rigidity, "sqrt"), (bending, "inverse_sqrt")))])
+            scene.add_terms([Term("rest", values[:, place], factor, ((rigidity, "sqrt"), (bending, "inverse_sqrt")))])
         if yields:
             scene.group(f"{name}_bend")[0].rest[:, 14:] = 0.0
             for place, label, unit in ((14, "yield_share", ""), (15, "yield_curvature", "1/m")):
                 quantity = scene.add_quantity(f"{fabric}_{label}", given[label], unit, shared=True)
-                scene.add_terms([Term("rest", values + place, 1.0, ((quantity, "identity"),))])
+                scene.add_terms([Term("rest", values[:, place], 1.0, ((quantity, "identity"),))])
 
 
 def _hinges_of_triangles(mesh: TriangleMesh) -> Array:

@@ -57,7 +57,7 @@ def add_membrane(cut: Cut, kept: Array, field: StiffnessField | None) -> None:
     def follow(place: int, label: str, value: float, unit: str, function: str, *over: tuple[str, str]) -> None:
         """Let a parameter of every triangle be a function of a new quantity of the fabric."""
         quantity = scene.add_quantity(f"{fabric}_{label}", value, unit, shared=True)
-        terms.append(Term("rest", values + place, 1.0, ((quantity, function), *over)))
+        terms.append(Term("rest", values[:, place], 1.0, ((quantity, function), *over)))
 
     over_warp = (f"{fabric}_warp", "inverse_sqrt")
     if given["weft"] is not None:
@@ -66,7 +66,7 @@ def add_membrane(cut: Cut, kept: Array, field: StiffnessField | None) -> None:
     poisson = scene.add_quantity(
         f"{fabric}_poisson", given["poisson"], "", positive=False, scale=0.1, limits=(-1.0, 1.0), shared=True
     )
-    terms.append(Term("rest", values + 4, 1.0, ((poisson, "identity"),)))
+    terms.append(Term("rest", values[:, 4], 1.0, ((poisson, "identity"),)))
     own = scene.groups[-1].rest
     if yields:
         own[:, _OF_LAW:] = 0.0  # the row of shear is scaled, and the strain at which it yields with it

@@ -12,8 +12,8 @@ from ..arrays.checks import finite
 from ..errors import SceneError
 from ..mesh import SolidMesh
 from ..quantities.quantities import Term
+from ..scene.group import places_in_rest
 from ..scene.scene import Array, Scene
-from .chain import first_value
 
 STRAIN = {8: "brick_strain", 4: "tetrahedron_strain"}
 YIELDING = "yielding_brick_strain"
@@ -125,33 +125,32 @@ class SolidRows:
         terms = [Term("compliance", at, 1.0 / volume, ((first, "inverse"),))]
         if damping is not None:
             terms.append(Term("damping", at, volume, ((self.tau, "identity"), (first, "identity"))))
-        place = values + 3 * (self.mesh.elements.shape[1] - 1)
+        own = values[:, -len(USUAL) :]
         for k, (pair, n) in enumerate(zip(("12", "13", "23"), law.poisson, strict=True)):
             name = self.scene.add_quantity(
                 f"{self.nu}_{pair}", n, "", positive=False, scale=0.1, limits=(-1.0, 1.0), shared=True
             )
-            terms.append(Term("rest", place + k, 1.0, ((name, "identity"),)))
+            terms.append(Term("rest", own[:, k], 1.0, ((name, "identity"),)))
         for k, name in enumerate([*others, *shears], start=3):
-            terms.append(Term("rest", place + k, 1.0, ((first, "identity"), (name, "inverse"))))
+            terms.append(Term("rest", own[:, k], 1.0, ((first, "identity"), (name, "inverse"))))
         self.scene.add_terms(terms)
 
     def _strains(self, damped: bool, axes: Array = WORLD) -> tuple[Array, Array, Array]:
         """Adds the strains along axes, columns (3, 3) or (m, 1, 3, 3), with zero compliance; returns their constraints,
-        volumes and first own parameters."""
+        volumes and parameters."""
         at, volume = self._points(STRAIN, damped, axes, USUAL)
-        width = 3 * (self.mesh.elements.shape[1] - 1) + len(USUAL)
-        return at, volume, first_value(self.scene, f"{self.name}_strain") + width * np.arange(len(volume))
+        return at, volume, places_in_rest(self.scene.groups, f"{self.name}_strain")
 
     def _yielding(self, damped: bool, stress: float, hardening: float | None) -> tuple[Array, Array]:
         """Adds the strains of what yields, with its quantities and zero compliance; returns them and their volumes.
         Their last parameters are H/(3 mu) and s sqrt(2/3)/(2 mu), with 2 mu = E/(1 + nu) (yielding_solid_strain.h)."""
         at, volume = self._points({8: YIELDING}, damped, WORLD, np.array([0.0, 1.0]), sets=2)
         rest = self.scene.groups[-1].rest
-        last = first_value(self.scene, f"{self.name}_strain") + rest.shape[1] * np.arange(1, len(rest) + 1) - 1
+        values = places_in_rest(self.scene.groups, f"{self.name}_strain")
         rest[:, -2:] = 0.0  # the terms make them
-        made = [(last, "yield_stress", stress, np.sqrt(2.0 / 3.0))]
+        made = [(values[:, -1], "yield_stress", stress, np.sqrt(2.0 / 3.0))]
         if hardening is not None:
-            made.append((last - 1, "hardening", hardening, 2.0 / 3.0))
+            made.append((values[:, -2], "hardening", hardening, 2.0 / 3.0))
         E, nu = (self.E, "inverse"), (self.nu, "identity")
         for places, label, value, factor in made:
             own = (self.scene.add_quantity(f"{self.material}_{label}", value, "Pa", shared=True), "identity")
@@ -225,8 +224,7 @@ class SolidRows:
         terms = [Term("compliance", at, 1.0 / volume, ((self.E, "inverse"),))]
         if damped:
             terms.append(Term("damping", at, volume, ((self.tau, "identity"), (self.E, "identity"))))
-        first = 3 * (self.mesh.elements.shape[1] - 1)
-        nu = (self.nu, "identity")
-        terms += [Term("rest", values + first + k, 1.0, (nu,)) for k in range(3)]
-        terms += [Term("rest", values + first + k, 2.0, (nu,)) for k in range(5, 8)]
+        own, nu = values[:, -len(USUAL) :], (self.nu, "identity")
+        terms += [Term("rest", own[:, k], 1.0, (nu,)) for k in range(3)]
+        terms += [Term("rest", own[:, k], 2.0, (nu,)) for k in range(5, 8)]
         self.scene.add_terms(terms)

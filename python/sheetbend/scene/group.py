@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +28,16 @@ class Group:
     damping: Array
     damped: bool
     rest: Array
+
+
+def places_in_rest(groups: Sequence[Group], name: str) -> Array:
+    """(count, parameters) where the parameters of a group's constraints stand in the input array "rest"."""
+    start = 0
+    for group in groups:
+        if group.name == name:
+            return start + np.arange(group.rest.size).reshape(group.rest.shape)
+        start += group.rest.size
+    raise KeyError(name)
 
 
 def make_group(
