@@ -227,7 +227,7 @@ class SceneReader {
     within("target", m.target, -entries, layout.total());
     within("parameter", m.parameter, -m.intermediates(), quantities);
     within("function", function, 0, factor_count);
-    if (!m.in_order()) file_.fail("target", "makes an intermediate value after it is used");
+    if (!m.in_order()) file_.fail("target", "makes an intermediate value after it is used, or leaves one out");
     for (const int f : function) m.function.push_back(static_cast<Factor1d>(f));
     return ParameterMap(std::move(m));
   }

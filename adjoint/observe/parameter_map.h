@@ -7,6 +7,7 @@
 #pragma once
 
 #include <algorithm>
+#include <functional>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -83,10 +84,13 @@ struct ParameterTerms {
 
   int factors_of(std::size_t term) const { return first_factor[term + 1] - first_factor[term]; }
   int intermediates() const { return target.empty() ? 0 : std::max(0, -*std::ranges::min_element(target)); }
-  // Whether each intermediate value is complete before another one is made of it, and none is used that is not made.
+  // Whether each intermediate value is made by some term, and complete before another one is made of it.
   bool in_order() const {
     const int made = intermediates();
-    std::vector<bool> used(made, false);
+    std::vector<bool> used(made, false), has_term(made, false);
+    for (const int input : target)
+      if (input < 0) has_term[-1 - input] = true;
+    if (!std::ranges::all_of(has_term, std::identity())) return false;
     for (std::size_t t = 0; t < target.size(); ++t) {
       for (int k = first_factor[t]; k < first_factor[t + 1]; ++k) {
         if (parameter[k] >= 0) continue;

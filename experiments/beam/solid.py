@@ -24,17 +24,22 @@ SIDEWAYS = 0.01  # m/N, of each link that keeps a face's side: a fortieth of wha
 
 def narrowing(out, mesh, beam, face, origin):
     """Hold a face that may narrow: its particles stay in its plane, at the ends of rigid links to anchors far along the
-    beam. Its four corners keep their height, which bending changes alike for all of them. Soft links keep its side.
+    beam. Their mean, by areas, keeps its height. Soft links keep its side.
 
     Returns the anchors, placed across the beam alone, and their places in the beam's axes."""
-    v = mesh.vertices
-    corners = face[(np.abs(v[face][:, 1:]) > SIDE / 2 - 1e-9).all(axis=1)]
+    own, areas = beam.particles[face], mesh.areas(face)
+    mean = sb.add_mean(out, own, areas, name="held_mean")
+    x = mesh.vertices[face]
     anchors, places = [], []
-    for axis, own, soft in ((0, face, 0.0), (2, corners, 0.0), (1, face, SIDEWAYS)):
-        away = v[own] - FAR * np.eye(3)[axis]
+    for axis, held, at, soft in (
+        (0, own, x, 0.0),
+        (2, [mean], (areas @ x / areas.sum())[None], 0.0),
+        (1, own, x, SIDEWAYS),
+    ):
+        away = at - FAR * np.eye(3)[axis]
         anchor = out.add_hidden(origin + away * [0.0, 1.0, 0.0], 1.0, pinned=True)
-        pairs = np.column_stack([beam.particles[own], anchor])
-        rest = np.full(len(own), FAR)
+        pairs = np.column_stack([held, anchor])
+        rest = np.full(len(held), FAR)
         out.add_constraints("distance", pairs, name=f"held_{'xyz'[axis]}", rest=rest, compliance=soft)
         anchors.append(anchor)
         places.append(away)

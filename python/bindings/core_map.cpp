@@ -17,7 +17,8 @@ ParameterMap make_map(const py::dict& d) {
   terms.first_factor = whole_numbers(d["first_factor"]);
   terms.parameter = whole_numbers(d["parameter"]);
   for (const int f : whole_numbers(d["function"])) terms.function.push_back(static_cast<Factor1d>(f));
-  if (!terms.in_order()) throw std::invalid_argument("the map makes an intermediate value after it is used");
+  if (!terms.in_order())
+    throw std::invalid_argument("the map makes an intermediate value after it is used, or leaves one out");
   return ParameterMap(std::move(terms));
 }
 

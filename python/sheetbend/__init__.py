@@ -55,6 +55,7 @@ from .objects.joint_making import Joint, ground
 from .objects.joints import ball, cylinder, fixed, hinge, slider, universal
 from .objects.locking import LockingWarning
 from .objects.markers import Place, along_rope, between, on_body, on_cloth, on_particle, on_rope, on_solid
+from .objects.mean import add_mean
 from .objects.over_time import OverTime, add_unknown_force, add_unknown_wind
 from .objects.rod import Rod, add_rod, rod
 from .objects.rod_junction import Junction
@@ -168,6 +169,7 @@ __all__ = [
     "UnconvergedError",
     "add_arm",
     "add_cloth",
+    "add_mean",
     "add_pendulum",
     "add_rod",
     "add_rope",

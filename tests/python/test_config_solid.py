@@ -114,6 +114,56 @@ def test_sets_of_a_box(tmp_path: Path) -> None:
     assert scene.quantities["hung_mass"].value == 0.01
 
 
+def test_a_face_is_fixed_to_a_body(tmp_path: Path) -> None:
+    """A plate on a hinge carries the bar, which swings with it; `held` leaves out the elements between its vertices."""
+    given = {name: value for name, value in BOX.items() if name != "pinned"} | {
+        "grip": [{"set": "x_min", "body": "plate"}]
+    }
+    more: dict[str, Any] = {
+        "body": [{"name": "plate", "mass": 0.01, "box": [0.01, 0.02, 0.02], "at": [0.0, 0.01, 0.51]}],
+        "joint": [
+            {"kind": "hinge", "name": "hinge", "lower": "plate", "at": [0.0, 0.01, 0.51], "axis": [0.0, 1.0, 0.0]}
+        ],
+    }
+    (tmp_path / "bar.toml").write_text(
+        tomli_w.dumps({"experiment": {"name": "bar"}, "solver": SOLVER, "scene": {"solid": [given], **more}})
+    )
+    scene = config.scene_alone(config.parse(tmp_path / "bar.toml"))[0]
+    bar, plate = scene.solids["bar"], scene.bodies["plate"]
+    face = bar.particles[bar.mesh.sets["x_min"]]
+    assert list(plate.attached) == face.tolist() and "bar_x_min_on_plate" in {g.name for g in scene.groups}
+    motion = sb.simulate(scene, [0.0, 0.1], sb.Solver(h=2e-3, method="newton"))
+    origin, frame = plate.pose(motion)
+    kept = scene.positions[face] - [0.0, 0.01, 0.51]
+    assert motion.positions[1, face] == approx(origin[1] + kept @ frame[1].T, abs=1e-9)
+    assert frame[1, 2, 0] < -0.2  # it swings down
+    for wrong, match in (({"set": "left"}, "no set"), ({"body": "none"}, "no body")):
+        changed = given | {"grip": [given["grip"][0] | wrong]}
+        (tmp_path / "bar.toml").write_text(
+            tomli_w.dumps({"experiment": {"name": "bar"}, "solver": SOLVER, "scene": {"solid": [changed], **more}})
+        )
+        with pytest.raises(sb.ConfigError, match=match):
+            config.scene_alone(config.parse(tmp_path / "bar.toml"))
+
+
+def test_a_weight_hangs_on_the_mean_of_a_face(tmp_path: Path) -> None:
+    given = BOX | {"mean": [{"name": "tip", "set": "x_max"}]}
+    scene_more: dict[str, Any] = {"point_mass": [{"name": "hung", "particle": "tip", "mass": 0.01}]}
+    marker = [{"marker": "tip", "particle": "tip"}]
+    recorded(tmp_path)
+    loaded = study(tmp_path, given, scene_more, marker=marker, recording=[{"file": "bar.npz"}])
+    scene = loaded.experiments[0].scene
+    bar = scene.solids["bar"]
+    motion = sb.simulate(scene, [0.0, 0.1], sb.Solver(h=2e-3, method="newton"))
+    face = motion.positions[1, bar.particles[bar.mesh.sets["x_max"]]]
+    (place,) = loaded.experiments[0].markers.values()
+    assert motion.positions[1, list(place.particles)][0] == approx(face.mean(axis=0), abs=1e-9)
+    for wrong, match in (({"set": "left"}, "no set"), ({"name": "bar"}, "is taken")):
+        own = BOX | {"mean": [{"name": "tip", "set": "x_max"} | wrong]}
+        with pytest.raises(sb.ConfigError, match=match):
+            study(tmp_path, own, scene_more, marker=marker, recording=[{"file": "bar.npz"}])
+
+
 def test_yield(tmp_path: Path) -> None:
     """Its quantities and its kind; what add_solid refuses is refused with the key's name."""
     recorded(tmp_path)

@@ -42,6 +42,8 @@ HEADERS: dict[str, type[Section]] = {
     "[[scene.cloth.bar]]": cloth_schema.Bar,
     "[scene.cloth.grid], [recording.grids.NAME]": cloth_schema.MarkerGrid,
     "[[scene.solid]]": solid_schema.SolidSection,
+    "[[scene.solid.grip]]": solid_schema.SolidGrip,
+    "[[scene.solid.mean]]": solid_schema.SolidMean,
     "[[scene.solid.set]]": solid_schema.SolidSet,
     "[[scene.particles]]": scene_schema.Particles,
     "[[scene.pendulum]]": scene_schema.Pendulum,

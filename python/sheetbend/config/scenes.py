@@ -75,7 +75,10 @@ def build_scene(
     _add_cloths(scene, particles, section, moment, folder, tools)
     for path, solid in _each("solid", section.solid):
         particles.free_name(path, solid.name)
-        particles.add_solid(*build_solid(scene, path, solid, folder, finer))
+        built, configured, means = build_solid(scene, path, solid, folder, finer)
+        particles.add_solid(built, configured)
+        for name, mean in means.items():
+            particles.add(particles.free_name(f"{path}.mean", name), [mean])
     add_winds(scene, section)
     _add_particles(scene, particles, section)
     for path, pendulum in _each("pendulum", section.pendulum):

@@ -18,9 +18,24 @@ class SolidSet(Section):
     """Vertices of a solid in a box of space. A list: [[scene.solid.set]]. A box of bricks has its faces as sets
     already: x_min, x_max, y_min, y_max, z_min and z_max."""
 
-    name: Name = key(..., "what `pinned` calls it")
+    name: Name = key(..., "what `pinned`, grips and means call it")
     lower: Vector = key(..., "the box's lowest corner", "m")
     upper: Vector = key(..., "its highest corner", "m")
+
+
+class SolidGrip(Section):
+    """Vertices of a solid that are fixed to a body where they are placed. A list: [[scene.solid.grip]]."""
+
+    set: Name = key(..., "a set of vertices, such as x_min")
+    body: Name = key(..., "the [[scene.body]] that they are fixed to; a `tool` or `pinned` of it holds or moves them")
+
+
+class SolidMean(Section):
+    """A particle at the mean of a set of vertices, weighted by their share of the surface, `add_mean`. A list:
+    [[scene.solid.mean]]. What is hung on it, pulls or holds it acts on all of them and lets them narrow."""
+
+    name: Name = key(..., "what [[scene.point_mass]], [[scene.force]], markers and `pin` call the particle")
+    set: Name = key(..., "a set with whole faces of elements, such as x_max")
 
 
 class SolidSection(Section):
@@ -63,6 +78,8 @@ class SolidSection(Section):
         None, "rise of the yield stress per plastic strain, kinematic; left out: perfectly plastic", "Pa", gt=0
     )
     pinned: list[str] = key([], "sets of vertices that are held where they start")
+    grip: list[SolidGrip] = key([], "sets of vertices that are fixed to bodies")
+    mean: list[SolidMean] = key([], "particles at the mean of sets of vertices")
     set: list[SolidSet] = key([], "further sets")
 
     @model_validator(mode="after")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,38 +10,53 @@ import numpy as np
 from .. import mesh as meshes
 from ..errors import ConfigError
 from ..mesh import SolidMesh
+from ..objects.body_end import attach
+from ..objects.mean import add_mean
 from ..objects.solid import Solid, add_solid
 from ..objects.solid_clusters import cluster_boxes
 from ..scene.scene import Scene
+from .bodies import named_body
 from .errors import located
 from .solid_schema import SolidSection
 
-_ELSEWHERE = {"name", "size", "cells", "origin", "file", "unit", "pinned", "set", "clusters"}
+_ELSEWHERE = {"name", "size", "cells", "origin", "file", "unit", "pinned", "grip", "mean", "set", "clusters"}
 
 
-def build_solid(scene: Scene, path: str, section: SolidSection, folder: Path, finer: int) -> tuple[Solid, SolidMesh]:
-    """Add a solid with its pinned vertices to a scene.
+def build_solid(
+    scene: Scene, path: str, section: SolidSection, folder: Path, finer: int
+) -> tuple[Solid, SolidMesh, dict[str, int]]:
+    """Add a solid to a scene, with its vertices that are pinned or fixed to bodies, and its means.
 
     Args:
         folder: files are relative to it.
         finer: multiplies the cells of a box; a mesh from a file stays as it is.
 
     Returns:
-        The solid, and its mesh as configured.
+        The solid, its mesh as configured, and the particles at means by name.
 
     Raises:
         ConfigError: anything inconsistent, with the path of the key.
     """
     mesh, configured = (_mesh(path, section, folder, times) for times in (finer, 1))
-    chosen = [_members(f"{path}.pinned", mesh, name) for name in section.pinned]
-    pinned = np.unique(np.concatenate([np.zeros(0, dtype=int), *chosen]))
+    pinned = _together([_members(f"{path}.pinned", mesh, name) for name in section.pinned])
+    gripped = [_members(f"{path}.grip[{i}].set", mesh, grip.set) for i, grip in enumerate(section.grip)]
     fields = section.model_dump(exclude=_ELSEWHERE, exclude_none=True)
     with located(path, section.name):
         clusters = None if section.clusters is None else cluster_boxes(mesh, section.clusters)
-        solid = add_solid(scene, mesh, section.name, clusters=clusters, held=pinned, **fields)
+        held = _together([pinned, *gripped])
+        solid = add_solid(scene, mesh, section.name, clusters=clusters, held=held, **fields)
         if len(pinned):
             scene.pin(solid.particles[pinned])
-    return solid, configured
+    for i, (grip, vertices) in enumerate(zip(section.grip, gripped, strict=True)):
+        body = named_body(f"{path}.grip[{i}].body", grip.body, scene)
+        with located(f"{path}.grip[{i}]", "attach"):
+            attach(body, solid.particles[vertices], name=f"{section.name}_{grip.set}_on_{grip.body}")
+    means: dict[str, int] = {}
+    for i, mean in enumerate(section.mean):
+        vertices = _members(f"{path}.mean[{i}].set", mesh, mean.set)
+        with located(f"{path}.mean[{i}]", mean.name):
+            means[mean.name] = add_mean(scene, solid.particles[vertices], mesh.areas(vertices), name=mean.name)
+    return solid, configured, means
 
 
 def _mesh(path: str, section: SolidSection, folder: Path, finer: int) -> SolidMesh:
@@ -57,6 +73,10 @@ def _mesh(path: str, section: SolidSection, folder: Path, finer: int) -> SolidMe
                 raise ConfigError(f"{path}.set[{i}]", "has no vertex", chosen.name, fix)
             sets[chosen.name] = inside
         return SolidMesh(mesh.vertices, mesh.elements, sets)
+
+
+def _together(vertices: Sequence[np.ndarray]) -> np.ndarray:
+    return np.unique(np.concatenate([np.zeros(0, dtype=int), *vertices]))
 
 
 def _members(path: str, mesh: SolidMesh, name: str) -> np.ndarray:

@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays.checks import check_count, check_kind, finite, whole
+from ..arrays.checks import check_count, check_kind, finite, index_array, whole
 from ..errors import MeshError
 from . import validate
 from .places import nearest
@@ -138,6 +138,25 @@ class SolidMesh:
             lower, upper: (3,) m; infinite entries leave a side open.
         """
         return validate.vertices_within(self.vertices, lower, upper)
+
+    def areas(self, vertices: ArrayLike) -> Array:
+        """(k,) m^2, what each of some vertices has of the surface between them: an equal part of each face that has all
+        of its corners among them.
+
+        Raises:
+            SceneError: a vertex that does not exist.
+            MeshError: one without such a face.
+        """
+        own = index_array("vertices", vertices, len(self.vertices))
+        faces = surface_faces(self.elements)
+        faces = faces[np.isin(faces, own).all(axis=1)]
+        corners = faces.shape[1]
+        a, b, c, d = (self.vertices[faces[:, k]] for k in (0, 1, 2, -1))
+        area = 0.5 * np.linalg.norm(np.cross(c - a, d - b if corners == 4 else b - a), axis=1)
+        shares = np.bincount(faces.ravel(), np.repeat(area / corners, corners), len(self.vertices))[own]
+        if bad := own[shares == 0.0].tolist():
+            raise MeshError("vertices", "have no face of the surface between them", bad, "give all corners of faces")
+        return shares
 
     def nearest(self, points: ArrayLike) -> Indices:
         """(k,) the vertex nearest to each of (k, 3) points in space, m."""

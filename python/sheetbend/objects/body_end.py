@@ -24,8 +24,8 @@ with 0.01, and 40 links of 12.5 mm, double precision lost these rows."""
 def attach(body: Body, particles: ArrayLike, *, name: str | None = None) -> str:
     """Fix particles to a body where they are, such as the edge of a cloth to a pole.
 
-    They start on the body for all values of the quantities of its start, or of the correction of the poses that it
-    rides on, and have their own mass.
+    They start on the body, with its velocity, for all values of the quantities of its start, or of the correction of
+    the poses that it rides on. They have their own mass. They cannot be pinned or driven afterwards.
 
     Args:
         body: what `Scene.add_body` returned.
@@ -56,8 +56,6 @@ def attach(body: Body, particles: ArrayLike, *, name: str | None = None) -> str:
     weights = np.stack([body.coordinates(expressions(x)) for x in places])
     constrain(scene, "coincide_particle", group, [[p, one, *axes] for one in own], weights)
     body.attached |= dict(zip(own, places, strict=True))
-    if body.correction is not None:
-        body.correction.place(scene, np.array(own))
     return group
 
 

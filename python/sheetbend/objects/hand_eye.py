@@ -10,7 +10,7 @@ the map from the six quantities to the scene's inputs and its derivative are exa
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,9 +19,10 @@ from numpy.typing import ArrayLike
 from ..arrays.checks import check_label, finite, is_number, vectors
 from ..arrays.rotations import rotated, unit_quaternions
 from ..errors import InputError, SceneError
-from ..quantities.expression import rotation_products
+from ..quantities.expression import rotation, rotation_products, vector
 from ..quantities.parameters import Parameter
 from ..quantities.quantities import Term
+from ..scene.body import FrameState
 from ..scene.moving_clamp import clamped_ends
 
 if TYPE_CHECKING:
@@ -145,6 +146,18 @@ class HandEye:
             kept = coefficients[0].ravel() != 0.0
             term = Term("position", index[kept], coefficients[0].ravel()[kept], tuple(factors.items()))
             scene.add_terms([term] if kept.any() else [])
+
+    def corrected_start(self, scene: Scene, start: FrameState) -> FrameState:
+        """The state of a body's frame at the start, moved by the correction."""
+        self.declare(scene)
+        turn, arm = rotation(self.quantities[3:]), start.origin - self.about
+        return replace(
+            start,
+            origin=vector(self.quantities[:3]) + self.about + turn @ arm,
+            frame=turn @ start.frame,
+            velocity=turn @ start.velocity,
+            spin=turn @ start.spin,
+        )
 
     def turned(self, by: Array, factors: Mapping[str, str]) -> Iterator[tuple[dict[str, str], Array]]:
         """Terms of vectors (..., 3), which have factors of their own, as the correction turns them."""

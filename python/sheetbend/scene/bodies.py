@@ -132,12 +132,14 @@ def _declare(scene: SceneData, names: Mapping[str, Sequence[str]], values: Mappi
             scene.add_quantity(quantity, float(value), unit, positive=scale is None, scale=scale)
 
 
+def driven_start(scene: SceneData, start: Start, frame: HasCorrection | None) -> FrameState:
+    """The state of a frame at the start, as the frame of its poses corrects it."""
+    shown = FrameState(*(expressions(v) for v in (start.at, start.frame, start.velocity, start.spin)))
+    return shown if frame is None else frame.corrected_start(scene, shown)
+
+
 def named_start(scene: SceneData, name: str, start: Start, role: str) -> FrameState:
-    """The state of a frame at the start; of a body that is not driven, as quantities of place, attitude and velocity
-    make it."""
-    if role == "driven":
-        at, frame, velocity, spin = (expressions(v) for v in (start.at, start.frame, start.velocity, start.spin))
-        return FrameState(at, frame, velocity, spin)
+    """The state of a frame at the start, as quantities of place, attitude and velocity make it."""
     names = names_of(name)
     given = {"place": np.zeros(3), "turn": np.zeros(3)}
     if role == "free":
@@ -182,16 +184,25 @@ class Path:
         return cls(t, x, frames)
 
     def start(self) -> Start:
-        """The state at the first knot."""
-        velocity = np.gradient(self.origins[:KNOTS], self.times[:KNOTS], axis=0, edge_order=2)[0]
-        rates = np.gradient(self.frames[:KNOTS], self.times[:KNOTS], axis=0, edge_order=2)[0]
-        spin = 0.5 * np.cross(self.frames[0], rates, axis=0).sum(axis=1)
-        return Start(self.origins[0], self.frames[0], velocity, spin)
+        """The state at 0 s, where the scene starts, or at the nearest knot."""
+        (place, velocity), (axes, rates) = self._at_start(self.origins), self._at_start(self.frames)
+        left, _, right = np.linalg.svd(axes)
+        frame = left @ right  # the nearest rotation: between knots the axes are a little off one
+        return Start(place, frame, velocity, 0.5 * np.cross(frame, rates, axis=0).sum(axis=1))
+
+    def _at_start(self, values: Array) -> tuple[Array, Array]:
+        """Values (knots, ...) and their rates at 0 s, on the curve that driven nodes follow (core/scene/motion.h)."""
+        t = self.times
+        k = min(max(int(np.searchsorted(t, 0.0, side="right")) - 1, 0), len(t) - 2)
+        width = t[k + 1] - t[k]
+        (a, b), (u, v) = values[k : k + 2], width * np.gradient(values, t, axis=0)[k : k + 2]
+        s = float(np.clip(-t[k] / width, 0.0, 1.0))
+        bend, twist = 3.0 * (b - a) - 2.0 * u - v, u + v - 2.0 * (b - a)
+        return a + s * (u + s * (bend + s * twist)), (u + s * (2.0 * bend + 3.0 * s * twist)) / width
 
 
 def drive_body(scene: HeldScene, body: Body, path: Path, frame: HasCorrection | None) -> None:
     """Let the nodes ride on a path, which a frame may correct."""
-    body.correction = frame
     own = np.stack([body.center, *body.axes.T])  # in the body's frame
     known = numbers(own, body.values())
     motion = np.einsum("tab,kb->tka", path.frames, known)

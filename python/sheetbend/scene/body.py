@@ -94,7 +94,6 @@ class Body:
         role: "free", "pinned" or "driven".
         spin_node: the hidden, pinned node that holds the angular momentum of a body that keeps it, or None.
         attached: particles that are fixed to it, with their places (3,) m in its frame, at which they start.
-        correction: the frame whose quantities correct the poses that it rides on (`HandEye`), or None.
     """
 
     name: str
@@ -106,7 +105,6 @@ class Body:
     role: str = "free"
     spin_node: int | None = None
     attached: dict[int, Array] = field(default_factory=dict, repr=False)
-    correction: Any = field(default=None, repr=False)
     _first: int | None = field(default=None, repr=False)  # of 18 intermediate values, the start as others see it
 
     def carrying(self) -> FrameState:
@@ -177,17 +175,18 @@ class Body:
         """Terms that make the nodes' initial positions and velocities depend on the quantities of the start: the
         expressions minus the numbers (nodes, 3) that are in the scene's arrays already. Before them, those of
         `carrying`."""
-        if self.role == "driven":
-            return []
         carried: list[Term] = []
         if self._first is not None:
-            own = self._first + np.arange(18)
-            carried = [Term("intermediate", own, 0.0, ()), *terms_of("intermediate", own, self.start.numbers)]
+            all_18 = self._first + np.arange(18)
+            carried = [Term("intermediate", all_18, 0.0, ()), *terms_of("intermediate", all_18, self.start.numbers)]
         s = self.start if self._first is None else self.carrying()
-        nodes = np.append(self.particles, np.array(list(self.attached), dtype=self.particles.dtype))
+        own = [] if self.role == "driven" else [self.center, *self.axes.T]  # driven nodes start on their path
+        nodes = np.array([*self.particles[: len(own)], *self.attached], dtype=self.particles.dtype)
+        if not len(nodes):
+            return carried
         index, point = 3 * nodes[:, None] + np.arange(3), np.ones(len(nodes), dtype=bool)
-        point[1:4] = False  # the axes are directions
-        arms = np.stack([s.frame @ x for x in (self.center, *self.axes.T, *self.attached.values())])
+        point[1 : len(own)] = False  # the axes are directions
+        arms = np.stack([s.frame @ x for x in (*own, *self.attached.values())])
         places = np.where(point[:, None], s.origin + arms, arms)
         found = carried + terms_of("position", index, places - given[nodes])
         if self.role == "pinned":

@@ -26,7 +26,8 @@ class HeldScene(SceneNodes):
             interpolation: "cubic" (C1) or "linear" (kicks at every knot).
 
         Raises:
-            SceneError: shapes, NaN, times that do not increase, or other knots than an earlier call's.
+            SceneError: shapes, NaN, times that do not increase, other knots than an earlier call's, or particles that
+                are attached to a body.
         """
         self._building()
         which, ends = self._with_clamps("drive", particles)
@@ -62,7 +63,7 @@ class HeldScene(SceneNodes):
 
         Raises:
             SceneError: shapes, NaN, times that do not increase or differ from an earlier call's, names that are
-                repeated, particles that are driven already.
+                repeated, particles that are driven already or attached to a body.
         """
         self._building()
         which, ends = self._with_clamps("follow", particles)
@@ -79,6 +80,7 @@ class HeldScene(SceneNodes):
     def _with_clamps(self, field: str, particles: ArrayLike) -> tuple[list[int], list[tuple[int, int]]]:
         """Particles to be driven, and those of them that are clamped ends of ropes, which are let go."""
         which: list[int] = self.node_array(field, particles).tolist()
+        self._refuse_attached(field, which)
         ends = clamped_ends(self, which)
         let_go(self, which, ends)
         return which, ends

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .body import FrameState
 from .held import HeldScene
 
 Array = np.ndarray
@@ -21,6 +22,8 @@ class HasCorrection(Protocol):
     ) -> None: ...
 
     def turned(self, by: Array, factors: Mapping[str, str]) -> Iterator[tuple[dict[str, str], Array]]: ...
+
+    def corrected_start(self, scene: Any, start: FrameState) -> FrameState: ...
 
 
 def drive_in_frame(

@@ -8,6 +8,8 @@ nodes.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -101,9 +103,23 @@ class SceneNodes(SceneData):
         return nodes
 
     def pin(self, particles: ArrayLike) -> None:
-        """Hold particles where they start."""
+        """Hold particles where they start.
+
+        Raises:
+            SceneError: no such particles, or ones that are attached to a body.
+        """
         self._building()
-        self.pinned |= set(self.node_array("pin", particles).tolist())
+        own = self.node_array("pin", particles).tolist()
+        self._refuse_attached("pin", own)
+        self.pinned |= set(own)
+
+    def _refuse_attached(self, field: str, which: Sequence[int]) -> None:
+        """Refuse to hold what a body moves already."""
+        wanted = set(which)
+        for body in self.bodies.values():
+            if bad := sorted(wanted & body.attached.keys()):
+                fix = "leave them out, or pin or drive the body"
+                raise SceneError(f"{field}.particles", f"are attached to the body '{body.name}'", bad, fix)
 
     def add_rotor(self, name: str) -> int:
         """Add a number that has inertia and no weight, the x of the hidden node that is returned, such as the angle of

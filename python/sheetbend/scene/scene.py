@@ -23,6 +23,7 @@ from .bodies import (
     checked_inertia,
     checked_start,
     drive_body,
+    driven_start,
     make_body,
     named_start,
     nodes_of,
@@ -108,9 +109,11 @@ class Scene(CollidingScene):
         role = "pinned" if pinned else "free" if path is None else "driven"
         x, v = nodes_of(given, start)
         nodes = add_nodes(self, x, v if role == "free" else np.zeros_like(v))
-        body = make_body(self, name, given, nodes, named_start(self, name, start, role), role)
+        correction = getattr(poses, "frame", None)
+        state = driven_start(self, start, correction) if path else named_start(self, name, start, role)
+        body = make_body(self, name, given, nodes, state, role)
         if path is not None:
-            drive_body(self, body, path, getattr(poses, "frame", None))
+            drive_body(self, body, path, correction)
         elif pinned:
             self.pin(nodes)
         else:

@@ -20,6 +20,7 @@ from .contacts import Contacts
 from .forces import Forces
 from .frames import Frame
 from .group import Group
+from .means import start_terms
 from .volume import Volumes
 
 Array = np.ndarray
@@ -64,6 +65,7 @@ class SceneData:
         self.cloths: dict[str, Any] = {}
         self.solids: dict[str, Any] = {}
         self.bodies: dict[str, Body] = {}
+        self.means: dict[int, tuple[Array, Array]] = {}  # by node: particles, and their weights of sum one
         self.over_time: dict[str, Any] = {}  # unknown inputs
         self.intermediates = 0  # how many intermediate values the terms make
         self.rotors: dict[str, list[int | None]] = {}  # five nodes by joint, of which the second turns
@@ -123,11 +125,12 @@ class SceneData:
 
     @property
     def every_term(self) -> list[Term]:
-        """Those that were added, of the boundary, and of the start of bodies, those first on which others hang."""
+        """Those that were added, of the boundary, of the start of bodies, those first on which others hang, and of that
+        of means."""
         x, v = self.nodes, self._of_nodes("velocities")
         starts = (t for body in sorted(self.bodies.values(), key=self._depth) for t in body.start_terms(x, v))
-        between = self.contacts.between_pieces()
-        return [*self.terms, *self.boundary.terms(), *self.forces.terms(), *starts, *between]
+        found = [*self.terms, *self.boundary.terms(), *self.forces.terms(), *starts, *self.contacts.between_pieces()]
+        return found + start_terms(self.means, found, x, v)
 
     def _depth(self, body: Body) -> int:
         """How many joints a body hangs on."""
