@@ -4,6 +4,7 @@
     python experiments/coverage/coverage.py table                     # what all lines say
 
 Chunks of seeds may run side by side, each with an `--out` of its own: the table reads every file of the folder.
+`--out experiments/coverage/expected` shows the cases of which every draw is kept.
 """
 
 from __future__ import annotations
@@ -34,6 +35,10 @@ def lines(folder: Path, case: str) -> dict[int, dict]:
     return known
 
 
+def short(value: float | None) -> float | None:
+    return None if value is None else float(f"{value:.6g}")
+
+
 def draw(case: str, seeds: range, folder: Path) -> None:
     """Fit every seed that is not known yet."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -45,8 +50,8 @@ def draw(case: str, seeds: range, folder: Path) -> None:
                 continue
             began = time.process_time()
             found = CASES[case].fit(seed)
-            estimates = {name: [e.value, e.lower, e.upper, e.verdict] for name, e in found.items()}
-            entry = {"seed": seed, "seconds": time.process_time() - began, "estimates": estimates}
+            estimates = {name: [*map(short, (e.value, e.lower, e.upper)), e.verdict] for name, e in found.items()}
+            entry = {"seed": seed, "seconds": short(time.process_time() - began), "estimates": estimates}
             file.write(json.dumps(entry) + "\n")
             file.flush()
 

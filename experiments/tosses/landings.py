@@ -1,12 +1,13 @@
 """Where a tossed cube comes to rest: its contact with the table from 30 tosses, and 33 others predicted.
 
-    python experiments/tosses/landings.py [--fit 30]
+    python experiments/tosses/landings.py [--fit 30] [--others FOLDER]
 
 The cube is a rigid body with rounded corners, which touch the table. A fit to the first frames after contact of every
 other toss finds friction, the dissipation of the contact, the rounding, the moments of inertia, the center of mass, the
 height of the table and the scale of lengths. Friction is found again from the whole paths. The other tosses are
 predicted from their frames before contact, beside the numbers that the authors of the data state, and beside
-predictions without physics.
+predictions without physics. FOLDER holds more tosses of this cube in a cube_tosses.npz as the source's
+(`make_data.py`), which are predicted too.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from pathlib import Path
 import numpy as np
 import sheetbend as sb
 from cube import MASS, RATE, SIDE
+from cutting import cut
 from scipy.optimize import minimize_scalar
 from sheetbend.arrays.rotations import matrices_of
 from sheetbend.quantities.quantities import Term
@@ -26,6 +28,7 @@ from sheetbend.quantities.quantities import Term
 DATA = Path(__file__).parent / "data" / "tosses.npz"
 SCALE = 1.0176  # of the data's lengths, from free flight
 SEEN = 8  # frames that a prediction starts from
+FEWEST = 4  # frames before contact of a toss of another folder
 AFTER = 6  # frames from the first contact on that the fit sees
 SOLVER = sb.Solver(h=1 / (16 * RATE), method="implicit")
 CORNERS = sb.box_corners(np.full(3, SIDE / SCALE))
@@ -68,9 +71,9 @@ class Toss:
         return np.arange(len(self.positions)) / RATE
 
 
-def tosses() -> list[Toss]:
-    """All of them, in the order of the source."""
-    data = np.load(DATA)
+def tosses(folder: Path | None = None) -> list[Toss]:
+    """All of them, in the order of the source: the ones that are shipped, or those of a folder."""
+    data = np.load(DATA) if folder is None else cut(np.load(folder / "cube_tosses.npz"))[1]
     x, q = (data[key].astype(float) for key in ("positions", "quaternions"))
     ends = zip(data["starts"][:-1], data["starts"][1:], data["toss"], data["free"], strict=True)
     return [Toss(f"toss {toss}", x[a:b], q[a:b], int(free)) for a, b, toss, free in ends]
@@ -177,8 +180,8 @@ def report(label: str, group: list[Toss], values: Mapping[str, float], seen: int
     )
 
 
-def main(count: int) -> None:
-    every = tosses()
+def main(count: int, folder: Path | None) -> None:
+    every, more = tosses(), [] if folder is None else tosses(folder)
     data = every[::2][:count]
     rest = [toss for toss in every if toss not in data]
     fit = fitted(data)
@@ -193,6 +196,13 @@ def main(count: int) -> None:
         report(f"fitted, {len(rest)} others", rest, found, seen)
         report(f"authors, {len(rest)} others", rest, AUTHORS, seen)
     report(f"fitted to the first {AFTER} frames after contact alone, {len(rest)} others", rest, impact)
+    known = {toss.name for toss in data}
+    held_out = [toss for toss in more if toss.name not in known and toss.free >= FEWEST]
+    if more:
+        print(f"{folder}: {len(more)} tosses, {len(held_out)} with {FEWEST} frames before contact that were not fitted")
+        for seen in (None, SEEN):
+            report(f"fitted, {len(held_out)} of {folder}", held_out, found, seen)
+        report(f"authors, {len(held_out)} of {folder}", held_out, AUTHORS)
     plain = np.mean([without_physics(toss) for toss in rest], axis=0)
     guesses = ("lies where it was seen last", "flies on until it is as low as it rests")
     for label, row in zip(guesses, plain, strict=True):
@@ -202,4 +212,6 @@ def main(count: int) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--fit", type=int, default=30, help="how many tosses are fitted")
-    main(parser.parse_args().fit)
+    parser.add_argument("--others", type=Path, metavar="FOLDER", help="more tosses of this cube to predict")
+    given = parser.parse_args()
+    main(given.fit, given.others)

@@ -50,6 +50,24 @@ def test_tosses_come_to_rest_as_predicted() -> None:
     assert off[:, 2].mean() < centered[:, 2].mean()  # the attitude tells where the center of mass is
 
 
+def test_tosses_of_another_folder_are_cut_as_the_shipped_ones(tmp_path: Path) -> None:
+    """Each begins two frames later here, in the columns of the source."""
+    from landings import tosses
+
+    shipped = tosses()[:3]
+    ends = np.cumsum([0] + [len(toss.times) - 2 for toss in shipped])
+    turns = np.concatenate([toss.quaternions[2:] for toss in shipped])[:, [3, 0, 1, 2]]
+    places = np.concatenate([toss.positions[2:] for toss in shipped])
+    columns = {"starts": ends, "toss": np.array([7, 8, 9]), "position": places, "quaternion": turns}
+    np.savez(tmp_path / "cube_tosses.npz", **columns)
+    for old, new, number in zip(shipped, tosses(tmp_path), (7, 8, 9), strict=True):
+        frames = len(new.times)
+        assert new.name == f"toss {number}" and 0 <= len(old.times) - 2 - frames <= 3
+        assert np.array_equal(new.positions, old.positions[-frames:])
+        assert np.array_equal(new.quaternions, old.quaternions[-frames:])
+        assert len(old.times) - old.free == frames - new.free  # the same first contact
+
+
 def test_first_frames_after_contact_tell_that_the_cube_is_hollow(monkeypatch: pytest.MonkeyPatch) -> None:
     """With half as many substeps as the experiment."""
     import landings
