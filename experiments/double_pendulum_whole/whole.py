@@ -65,7 +65,7 @@ def fitted(e: sb.Experiment, parameters: Parameters, loss: float | None = None) 
     """
     assert isinstance(e.shooting, sb.Shooting)
     e = replace(e, shooting=sb.Shooting(e.shooting.window, loss))
-    (cut,), begun = joined([e], parameters, 1)
+    (cut,), begun, _ = joined([e], parameters, 1)
     problem = FitProblem([cut], parameters, expanded=begun)
     walk = Approach(problem, problem.parameters.initial())
     while walk.step():

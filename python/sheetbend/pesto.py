@@ -63,7 +63,9 @@ def problem(
     if over_time := [e.name for e in experiments if e.scene.over_time]:
         raise InputError("scene", "has unknown inputs over time", over_time[:5], "use sheetbend.fit")
     wanted = as_parameters(parameters, experiments)
-    experiments, expanded = joined(experiments, wanted, threads)
+    experiments, expanded, stopped = joined(experiments, wanted, threads)
+    if stopped:
+        raise KeyboardInterrupt
     fitted = [e for e in experiments if e.predict is None]
     found = FitProblem(fitted, wanted, threads=threads, expanded=expanded)
     found.check_start()

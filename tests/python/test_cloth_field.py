@@ -157,9 +157,9 @@ def test_size_and_length_are_sought_again_where_the_first_minimum_is_left(monkey
     plain = sb.fit(e, parameters=["cloth_warp"], **given)
     settled, reach, told, windows = behind.settled, behind.reach, list[Any](), list[Any]()
 
-    def leaving(search: Search, problem: FitProblem, beginnings: bool) -> Reached:
+    def leaving(search: Search, problem: FitProblem, beginnings: bool, stopped: bool) -> Reached:
         windows.append(search.windows)
-        found = reach(search, problem, beginnings)
+        found = reach(search, problem, beginnings, stopped)
         return replace(found, ends=(found.ends[0], *found.ends))
 
     def seeking(*given: Any) -> Any:

@@ -21,6 +21,7 @@ from sheetbend.minimum.lifted import Lifted
 from sheetbend.minimum.lifted_window import LiftedWindow, Seen
 from sheetbend.minimum.optimizers import walked
 from sheetbend.minimum.problem import FitProblem
+from sheetbend.minimum.progress import Progress
 from sheetbend.statistics.chain import Chain, Gap, Window
 
 RATE, NOISE = 50.0, 2e-4
@@ -305,7 +306,7 @@ def test_a_wrong_loss_is_doubted_after_single_steps_of_the_states(
     e, wanted = swing(stop=4.0), ("arm_inertia", "arm_angle", "arm_rate")
     e = replace(e, scene=pendulum(0.0033, given)[0], shooting=shooting)
     parameters = as_parameters(wanted, [e])
-    experiments, at = joined([e], parameters, 1)
+    experiments, at, _ = joined([e], parameters, 1)
     problem = FitProblem(experiments, parameters, expanded=at)
     u = walked(problem, problem.parameters.initial(), None)
     problem.evaluate(u)
@@ -313,6 +314,20 @@ def test_a_wrong_loss_is_doubted_after_single_steps_of_the_states(
     found = missing_loss(problem, u, (problem, u)) if given == 0.0 else other_losses(problem, u)
     assert set(found) == set(wanted) and all(words.startswith(doubt) for words in found.values())
     assert sum(made) <= 7 * 5  # of 5 windows; 12 * 5 where they follow to the end
+
+
+def test_ctrl_c_while_gaps_are_sought_keeps_the_point_reached_last() -> None:
+    reached: list[Progress] = []
+
+    def press(progress: Progress) -> None:
+        reached.append(progress)
+        if len(reached) == 8:
+            raise KeyboardInterrupt
+
+    fit = sb.fit(swing(shooting=0.4), parameters=list(WANTED), progress=press)
+    assert fit.interrupted and not fit.result.converged and len(reached) == 8
+    assert np.log(fit["arm_inertia"].value) == pytest.approx(reached[-1].u[0])
+    assert fit.result.shot[0].loss > 0.0 and "best point so far" in fit.report()
 
 
 def test_windows_are_refused_where_they_cannot_be() -> None:

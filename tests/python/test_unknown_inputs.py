@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +20,7 @@ from sheetbend.config import load
 from sheetbend.config.values import with_values
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.problem import FitProblem
+from sheetbend.minimum.progress import Progress
 from sheetbend.minimum.smooth import with_fields
 from sheetbend.objects.over_time import modes_of_times
 from sheetbend.page.of_fit import result_page
@@ -206,6 +208,26 @@ def test_a_force_is_found_beside_the_stiffness() -> None:
     )
     assert plain.result.misfit is not None and plain.result.misfit.reduced_chi_square > 30.0
     assert any("misses" in words for words in plain.result.warnings)
+
+
+@pytest.mark.parametrize("steps", [1, 3])
+def test_ctrl_c_while_the_size_is_sought_keeps_the_point_reached_last(steps: int) -> None:
+    """It comes after so many steps of the first walk, and no search follows."""
+    e, _ = seen(5)
+    reached: list[Progress] = []
+
+    def press(progress: Progress) -> None:
+        reached.append(progress)
+        if len(reached) == steps:
+            raise KeyboardInterrupt
+
+    fit = sb.fit(e, parameters={"rope_EI": {"initial": 2e-3}}, progress=press, windows=(), **ALONE)
+    assert fit.interrupted and not fit.result.converged and len(reached) == steps
+    assert math.log(fit["rope_EI"].value) == pytest.approx(reached[-1].u[0])
+    (found,) = fit.result.over_time
+    assert (found.size_lower is None, found.size_upper) == (False, None)
+    assert ("open" in fit.report()) and fit.result.first_cost == pytest.approx(reached[-1].cost, rel=1e-6)
+    assert "interrupted: the best point so far" in fit.report()
 
 
 def _leaves_modes_out(result: sb.FitResult) -> None:

@@ -32,7 +32,7 @@ from .lifted_starts import begun
 from .optimizers import walked
 from .parts import expanded_to
 from .problem import FitProblem
-from .progress import Observer
+from .progress import Latest, Observer
 
 GROWN = 10.0  # of small displacements, over a window that is chosen
 PARTS = 10  # at least, of a motion whose windows are chosen
@@ -56,9 +56,10 @@ class Loss:
 
 def joined(
     experiments: Sequence[Experiment], wanted: Parameters, threads: int, observe: Observer | None = None
-) -> tuple[list[Experiment], Parameters | None]:
-    """The experiments with all of their shooting known, and the parameters, expanded, that they were found with, for a
-    search to begin at; None where no experiment is shot in windows.
+) -> tuple[list[Experiment], Parameters | None, bool]:
+    """The experiments with all of their shooting known, the parameters, expanded, that they were found with, for a
+    search to begin at, or None where no experiment is shot in windows, and whether Ctrl-C ended this. Then all is as it
+    was at the point reached last; before gaps are sought there is none, and Ctrl-C passes through.
 
     Raises:
         InputError: see `shooting.cut`.
@@ -67,36 +68,40 @@ def joined(
     places = [i for i, e in enumerate(every) if e.predict is None]
     fitted = [every[i] for i in places]
     if not any(map(shot, fitted)):
-        return list(experiments), None
+        return list(experiments), None, False
     parameters = expanded_to(wanted, fitted)
     u = parameters.initial()
     size = {e.name: _size(e) for e in fitted}
     given = {e.name: own.loss for e in fitted if (own := shot(e)) is not None and own.is_given}
     fitted, u = _nearer(fitted, wanted, parameters, threads, observe)
     fitted = [_with_gap(e, LOOSE * size[e.name]) for e in fitted]
-    for _ in range(ROUNDS):
-        problem = FitProblem(fitted, wanted, threads=threads, expanded=parameters)
-        u = walked(problem, u, observe)
-        ok, _, _ = problem.evaluate(u)
-        if not ok:
-            break
-        here = [_state(e, problem, i) for i, e in enumerate(fitted)]
-        moved = 0.0
-        for i, e in enumerate(here):
-            own = shot(e)
-            if own is None or own.loss is None:
-                continue
-            told = given.get(e.name)
-            wanted_loss = loss(problem, u, i, size[e.name]).value if told is None else told
-            closer = max(wanted_loss, CLOSER * own.loss)
-            moved = max(moved, abs(math.log(closer / own.loss)))
-            here[i] = replace(e, shooting=replace(own, loss=closer))
-        fitted = here
-        if moved < SETTLED:
-            break
+    at, interrupted = Latest(observe, u), False
+    try:
+        for _ in range(ROUNDS):
+            problem = FitProblem(fitted, wanted, threads=threads, expanded=parameters)
+            at.u = walked(problem, at.u, at)
+            ok, _, _ = problem.evaluate(at.u)
+            if not ok:
+                break
+            here = [_state(e, problem, i) for i, e in enumerate(fitted)]
+            moved = 0.0
+            for i, e in enumerate(here):
+                own = shot(e)
+                if own is None or own.loss is None:
+                    continue
+                told = given.get(e.name)
+                wanted_loss = loss(problem, at.u, i, size[e.name]).value if told is None else told
+                closer = max(wanted_loss, CLOSER * own.loss)
+                moved = max(moved, abs(math.log(closer / own.loss)))
+                here[i] = replace(e, shooting=replace(own, loss=closer))
+            fitted = here
+            if moved < SETTLED:
+                break
+    except KeyboardInterrupt:
+        interrupted = True
     for i, e in zip(places, fitted, strict=True):
         every[i] = e
-    return every, parameters.starting_at(u)
+    return every, parameters.starting_at(at.u), interrupted
 
 
 def _nearer(

@@ -47,6 +47,18 @@ class Minimum:
 Observer = Callable[[Progress], None]
 
 
+class Latest:
+    """Keeps the point that was reached last and passes progress on."""
+
+    def __init__(self, observe: Observer | None, u: np.ndarray) -> None:
+        self.observe, self.u = observe, u
+
+    def __call__(self, progress: Progress) -> None:
+        self.u = progress.u
+        if self.observe is not None:
+            self.observe(progress)
+
+
 class Best:
     """Keeps the best point seen and passes progress on."""
 

@@ -102,6 +102,18 @@ class Search:
             return self._raced(problem, name, points)
         return self._searched([_Way(self, problem, name, u) for u in points])
 
+    def stopped(self, problem: FitProblem) -> Found:
+        """What was found where Ctrl-C came before the search: where it would begin.
+
+        Raises:
+            KeyboardInterrupt: the motion has no answer there.
+        """
+        name, u = named(self.optimizer), problem.parameters.initial()
+        end = _Way(self, problem, name, u, u=u).interrupted()
+        if end is None:
+            raise KeyboardInterrupt
+        return Found((replace(end, first=end.cost),), name, True, growths(problem, u))
+
     def _searched(self, ways: Sequence[_Way]) -> Found:
         """One way after the other to its end."""
         name, ends, began = ways[0].optimizer, list[Minimum](), tuple[Growth, ...]()

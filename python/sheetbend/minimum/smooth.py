@@ -28,7 +28,7 @@ from .growth import growths
 from .optimizers import walked
 from .parts import expanded_to
 from .problem import FitProblem
-from .progress import Observer
+from .progress import Latest, Observer
 from .windows import chosen, through
 
 FIRST_SIZE, FIRST_LENGTH = 0.5, 0.25  # of the scale, which is 1 for ln E; of the extent
@@ -71,7 +71,7 @@ class Field:
         modes: as the scene has them, of the first scene that does.
         wanted: as it was asked for.
         size, length: of the prior.
-        size_ends, length_ends: of their 95 % intervals.
+        size_ends, length_ends: of their 95 % intervals; (None, None) of what was given.
         own: by recording, its modes, where each has numbers of its own; empty where all share them.
     """
 
@@ -142,7 +142,8 @@ def with_fields(
             raise InputError(f"smooth.{name}", "has modes that are parameters already", twice, fix)
         size = wanted.size or FIRST_SIZE * modes.scale
         own = {recording: modes for recording, modes in own.items() if recording in fitted}
-        field = Field(modes, wanted, size, wanted.length or FIRST_LENGTH * modes.extent, own=own)
+        length = wanted.length or FIRST_LENGTH * modes.extent
+        field = Field(modes, wanted, size, length, _open(wanted.size), _open(wanted.length), own)
         if own or not private:
             fields.append(field)
         quantities = next(e.scene.quantities for e in experiments if modes.modes[-1] in e.scene.quantities)
@@ -157,6 +158,11 @@ def with_fields(
         ]
         parameters = field.carried(Parameters([*parameters.values(), *more]))
     return parameters, tuple(fields)
+
+
+def _open(given: float | None) -> tuple[float | None, float | None]:
+    """The ends of a size or length before the recordings tell anything of it."""
+    return (0.0, None) if given is None else (None, None)
 
 
 def inputs_over_time(experiments: Sequence[Experiment]) -> dict[str, dict[str, OverTime]]:
@@ -197,8 +203,9 @@ def settled(
     threads: int,
     windows: Sequence[float] | str = (),
     observe: Observer | None = None,
-) -> tuple[Parameters, Parameters | None, tuple[Field, ...]]:
-    """The parameters with the priors that are most likely, also expanded where the search begins, and the fields.
+) -> tuple[Parameters, Parameters | None, tuple[Field, ...], bool]:
+    """The parameters with the priors that are most likely, also expanded where the search begins, the fields, and
+    whether Ctrl-C ended this. Then all is as it was at the point reached last.
 
     So many numbers explain a long motion nearly in a wrong minimum, too. So the first walk goes through windows.
 
@@ -207,28 +214,36 @@ def settled(
         windows: s, or "auto", see `fit`.
     """
     if not fields:
-        return wanted, expanded, ()
+        return wanted, expanded, (), False
     here, found = expanded_to(wanted, experiments) if expanded is None else expanded, tuple(fields)
-    u = here.initial()
-    for k in range(ROUNDS):
-        for field in found:
-            wanted, here = field.carried(wanted), field.carried(here)
-        problem = FitProblem(experiments, wanted, threads=threads, expanded=here)
-        if k == 0:
-            lengths = chosen(problem, growths(problem, u)) if isinstance(windows, str) else [*map(float, windows)]
-            u = through(problem, lengths, u)
-        u = walked(problem, u, observe)
-        picture = Picture.at(problem, u, found)
-        if picture is None:
-            break
-        before = found
-        for i in range(len(found)):
-            found = (*found[:i], picture.likeliest(found, i), *found[i + 1 :])
-        if all(_apart(a, b) < SETTLED for a, b in zip(before, found, strict=True)):
-            break
-    for field in found:
-        wanted, here = field.carried(wanted), field.carried(here)
-    return wanted, here.starting_at(u), found
+    at, interrupted = Latest(observe, here.initial()), False
+    try:
+        for k in range(ROUNDS):
+            wanted, here = _carried(found, wanted), _carried(found, here)
+            problem = FitProblem(experiments, wanted, threads=threads, expanded=here)
+            if k == 0:
+                auto = isinstance(windows, str)
+                lengths = chosen(problem, growths(problem, at.u)) if auto else [*map(float, windows)]
+                at.u = through(problem, lengths, at.u, at)
+            at.u = walked(problem, at.u, at)
+            picture = Picture.at(problem, at.u, found)
+            if picture is None:
+                break
+            before = found
+            for i in range(len(found)):
+                found = (*found[:i], picture.likeliest(found, i), *found[i + 1 :])
+            if all(_apart(a, b) < SETTLED for a, b in zip(before, found, strict=True)):
+                break
+    except KeyboardInterrupt:
+        interrupted = True
+    return _carried(found, wanted), _carried(found, here).starting_at(at.u), found, interrupted
+
+
+def _carried(fields: Sequence[Field], parameters: Parameters) -> Parameters:
+    """The parameters with the priors of all fields."""
+    for field in fields:
+        parameters = field.carried(parameters)
+    return parameters
 
 
 def _apart(a: Field, b: Field) -> float:

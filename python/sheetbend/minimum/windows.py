@@ -16,6 +16,7 @@ from ..errors import InputError
 from .approach import Approach, Tally
 from .growth import ROUGH, Growth
 from .problem import FitProblem
+from .progress import Observer, Progress
 
 SHARES = (1 / 27, 1 / 9, 1 / 3)  # of the longest motion
 GROWN = (30.0, 1e3, ROUGH)
@@ -100,12 +101,13 @@ def along(
         ahead.insert(0, between)
 
 
-def through(whole: FitProblem, lengths: Sequence[float], u: np.ndarray, tally: Tally | None = None) -> np.ndarray:
+def through(whole: FitProblem, lengths: Sequence[float], u: np.ndarray, observe: Observer) -> np.ndarray:
     """(free,) where walks through windows end, for a walk on the whole motion to begin at."""
-    for length, walk in along(whole, [*lengths, math.inf], u, tally or Tally()):
+    for length, walk in along(whole, [*lengths, math.inf], u, Tally()):
         if math.isinf(length):
             return walk.u
         while walk.iterations < STEPS and walk.step():
+            observe(Progress(walk.iterations, walk.cost, walk.u.copy(), length))
             if walk.promised < TOLERANCE or walk.taken < TOLERANCE:
                 break
     raise AssertionError("the whole motion comes last")
