@@ -6,7 +6,8 @@ forked from one that has imported everything, and prints one line of JSON.
 Files that tests write and experiments ship (`fuzz_targets.py`) are cut, flipped, repeated and filled with odd numbers
 and words (`mutations.py`). A reader may read such a file or refuse it with an error of the package. A finding is
 anything else: another exception, memory beyond 1 GB, or 10 s of processor time, which ends the process by SIGPROF (a
-crash ends it anyway), with the case left in the folder that `--keep` names.
+crash ends it anyway), with the case left in the folder that `--keep` names. A refusal that says only that the file is
+damaged is no finding; the first of each cause is printed as `unspecific`.
 """
 
 from __future__ import annotations
@@ -41,6 +42,7 @@ def run(name: str, seed: int, cases: int, seconds: float, keep: Path) -> dict[st
     target, rng = TARGETS[name], random.Random(seed)
     counts: Counter[str] = Counter()
     findings: list[str] = []
+    unspecific: dict[str, str] = {}
     longest = 0.0
     with tempfile.TemporaryDirectory() as made:
         seeds = target.seeds(Path(made))
@@ -57,10 +59,12 @@ def run(name: str, seed: int, cases: int, seconds: float, keep: Path) -> dict[st
             (folder / file).write_bytes(content)
         signal.setitimer(signal.ITIMER_PROF, SECONDS)
         started = time.process_time()
-        outcome, told = outcome_of(target.read, folder / main)
+        outcome, told, cause = outcome_of(target.read, folder / main)
         longest = max(longest, time.process_time() - started)
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         counts[outcome] += 1
+        if cause:
+            unspecific.setdefault(outcome, cause)
         if told:
             findings.append(told)
             os.rename(folder, keep / f"{name}_{seed}_{len(findings)}")
@@ -69,11 +73,11 @@ def run(name: str, seed: int, cases: int, seconds: float, keep: Path) -> dict[st
                 (folder / file).unlink()
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
     return {"reader": name, "cases": counts.total(), "outcomes": dict(counts), "longest_s": round(longest, 2),
-            "peak_mb": peak, "findings": findings}  # fmt: skip
+            "peak_mb": peak, "findings": findings, "unspecific": unspecific}  # fmt: skip
 
 
-def outcome_of(read: Callable[[Path], object], path: Path) -> tuple[str, str]:
-    """What came of a case, and what is to be told of it."""
+def outcome_of(read: Callable[[Path], object], path: Path) -> tuple[str, str, str]:
+    """What came of a case, what is to be told of it, and where a refusal that names no fault came from."""
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
@@ -82,13 +86,21 @@ def outcome_of(read: Callable[[Path], object], path: Path) -> tuple[str, str]:
         cause = error.__cause__
         while cause is not None and cause.__cause__ is not None:
             cause = cause.__cause__
-        if isinstance(cause, MemoryError):
-            return "memory", f"more than 1 GB: {error}"
-        unspecific = "not what its reader takes it for" in str(error)
-        return (f"refused: {type(cause).__name__}" if unspecific else "refused"), ""
+        if isinstance(cause, MemoryError) and not untouched(cause):
+            return "memory", f"more than 1 GB: {error}", ""
+        if cause is not None and "not what its reader takes it for" in str(error):
+            where = "".join(traceback.format_list(traceback.extract_tb(cause.__traceback__)[-2:]))
+            return f"refused: {type(cause).__name__}", "", f"{cause}\n{where}"
+        return "refused", "", ""
     except Exception:
-        return "foreign", traceback.format_exc()
-    return "read", ""
+        return "foreign", traceback.format_exc(), ""
+    return "read", "", ""
+
+
+def untouched(error: MemoryError) -> bool:
+    """Whether what was asked for is filled only as far as the file goes, so that memory is never taken."""
+    line = traceback.extract_tb(error.__traceback__)[-1].line or ""
+    return any(call in line for call in ("fromfile(", "np.empty("))
 
 
 def limit(more: int) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import pickle
 import random
 import zlib
 from collections.abc import Callable
@@ -11,28 +9,19 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+import fuzz_seeds
 import numpy as np
 import sheetbend as sb
-import test_c3d
-import test_config_cloth
-import test_journal
-import test_motion_capture
-import test_readers
-import test_written_files
+from fuzz_seeds import Files
 from mutations import database, json_tree, mutated, packed, toml_tree
 from sheetbend import config
 from sheetbend.cli.gripped import load_ropes
+from sheetbend.config.fabric_tests import load_fabric_tests
 from sheetbend.files.door import reading
 from sheetbend.files.names import flaw
 from sheetbend.minimum import journal
-from sheetbend.report.fit_result import FitResult
-from sheetbend.result import result
 from sheetbend.scene.scene_reader import MAGIC, PREFIX, VERSION
-from sheetbend.textile import read_curves
-
-EXPERIMENTS = Path(__file__).resolve().parents[2] / "experiments"
-
-Files = dict[str, bytes]
+from sheetbend.textile import read_curves, read_outline
 
 
 @dataclass(frozen=True)
@@ -42,179 +31,6 @@ class Target:
     seeds: Callable[[Path], list[Files]]
     read: Callable[[Path], object]
     mutate: Callable[[random.Random, bytes, list[bytes]], bytes]
-
-
-# ---- seeds ----------------------------------------------------------------------------------------------
-
-
-def _saved(folder: Path, suffix: str) -> bytes:
-    recording = sb.Recording(
-        np.random.default_rng(1).normal(size=(4, 5, 3)), np.arange(4) / 100, ["a", "b", "c", "d", "e"], clamped=[0]
-    )
-    recording.save(folder / f"saved{suffix}")
-    return (folder / f"saved{suffix}").read_bytes()
-
-
-def _csv(folder: Path) -> list[Files]:
-    long = "time,marker,x,y,z\n" + "".join(f"{k // 3 / 100},m{k % 3},{k}.5,2,nan\n" for k in range(12))
-    stamps = "# a remark\n%time\ta.x\ta.y\ta.z\n1700000000000000001\t1\t2\t3\n1700000000010000001\t\t\t\n"
-    commas = "Zeit [s];x1 [mm];y1 [mm];z1 [mm]\n0,00;1,5;2,25;3,0\n0,01;0,0;0,0;0,0\n"
-    poses = "%time,field.header.seq,field.a.position.x,field.a.position.y,field.a.position.z\n17,0,1,2,3\n"
-    texts = [_saved(folder, ".csv"), long.encode(), stamps.encode(), commas.encode(), poses.encode()]
-    return [{"take.csv": text} for text in texts]
-
-
-def _mocap(folder: Path) -> list[Files]:
-    written = (
-        test_motion_capture.motive(folder / "take.csv"),
-        test_motion_capture.motive(folder / "code.csv", timecode=True),
-        test_motion_capture.vicon(folder),
-        test_motion_capture.qtm(folder),
-    )
-    texts = [*(path.read_bytes() for path in written), test_motion_capture.ROWS.encode()]
-    return [{"take.csv": text} for text in texts]
-
-
-def _trc(folder: Path) -> list[Files]:
-    return [{"take.trc": test_readers.TRC.encode()}]
-
-
-def _npz(folder: Path) -> list[Files]:
-    shipped = EXPERIMENTS / "wires" / "data" / "red_0.npz"
-    return [{"take.npz": _saved(folder, ".npz")}, {"take.npz": shipped.read_bytes()}]
-
-
-def _npy(folder: Path) -> list[Files]:
-    np.save(folder / "take.npy", np.random.default_rng(1).normal(size=(4, 5, 3)))
-    return [{"take.npy": (folder / "take.npy").read_bytes(), "take.json": b'{"rate": 100}'}]
-
-
-def _pickles(folder: Path) -> list[Files]:
-    frames = np.random.default_rng(1).normal(size=(4, 3, 5))
-    contents = (list(frames), frames, frames.tolist(), frames.transpose(2, 1, 0), [f.astype(">f4") for f in frames])
-    return [{"take.pkl": pickle.dumps(c, protocol=k)} for c in contents for k in range(6)]
-
-
-def _c3d(folder: Path) -> list[Files]:
-    kinds = [(kind, scale) for kind in (test_c3d.INTEL, test_c3d.DEC, test_c3d.MIPS) for scale in (-0.1, 0.1)]
-    return [{"take.c3d": test_c3d.written(folder, kind, scale).read_bytes()} for kind, scale in kinds]
-
-
-def _sidecar(folder: Path) -> list[Files]:
-    said = {
-        "units": "mm, s", "name": "swing 3", "markers": ["a", "b", "c", "d", "e"], "clamped": ["a", 1], "rate": 120,
-        "gravity": [0, 0, -9.81], "known": {"length": 0.3}, "attribution": "a laboratory", "arrays": {"x": [[4, 2, 3]]},
-    }  # fmt: skip
-    archive, rope = _saved(folder, ".npz"), _saved(folder, ".pkl")
-    shipped = (EXPERIMENTS / "beam" / "data" / "beam_gravity_b.json").read_bytes()
-    return [
-        {"take.json": json.dumps(said).encode(), "take.npz": archive},
-        {"take.json": json.dumps(said).encode(), "take.pkl": rope},
-        {"take.json": shipped, "take.pkl": rope},
-    ]
-
-
-def _toml(folder: Path) -> list[Files]:
-    scene = sb.rope(0.6, 4, density=0.05, EA=1e3, EI=1e-3)
-    motion = sb.simulate(scene, np.arange(6) / 100, sb.Solver(h=1 / 400))
-    sb.Recording(motion.positions, motion.times, name="swing").save(folder / "swing.npz")
-    sheet = sb.Recording(np.repeat(test_config_cloth.PLACED[None], 4, axis=0), np.arange(4) / 100, ["a", "b", "c"])
-    sheet.save(folder / "sheet.npz")
-    data = {name: (folder / name).read_bytes() for name in ("swing.npz", "sheet.npz", "sheet.json", "swing.json")}
-    texts = [test_written_files.ROPE, test_config_cloth.CLOTH]
-    for name in ("pendulum", "twin", "twin_cloth", "gripped_ropes", "wires", "beam", "held_cloth"):
-        text = (EXPERIMENTS / name / f"{name}.toml").read_text()
-        texts.append(text.replace("data/", f"{EXPERIMENTS}/{name}/data/"))
-    return [{"my.toml": text.encode(), **data} for text in texts]
-
-
-def _fits(folder: Path) -> list[Files]:
-    estimate = result.Estimate(
-        name="EI", value=1e-3, unit="N m^2", lower=9e-4, upper=None, half_width=None, statistical=None,
-        discretization=0.0, verdict="one-sided", words="bounded",
-    )  # fmt: skip
-    found = FitResult(
-        estimates=(estimate,),
-        recordings=(result.RecordingFit(name="a", rows=9, rms=1e-3, held_out=2e-3, baseline=3e-3, motion=1e-2),),
-        given=(result.Given(name="EA", value=1.0, unit="N", words="fixed"),),
-        correlations=(result.Correlation(first="EI", second="EI", value=0.5),),
-        starts=(result.Start(cost=1.0, iterations=3, converged=True, values={"EI": 1e-3}),) * 2,
-        refits=(result.Refit(name="finer mesh", to_limit=4 / 3, moved={"EI": 1e-5}),),
-        gauges=("EI/EA is known",), warnings=("a warning",), cost=1.0, rows=9, optimizer="ceres", iterations=3,
-        seconds=0.1, converged=True,
-    )  # fmt: skip
-    return [{"fit.json": json.dumps(found.to_dict()).encode()}]
-
-
-def _meshes(folder: Path) -> list[Files]:
-    mesh = sb.mesh.grid(0.2, 0.2, 2, 2)
-    sb.mesh.write_obj(folder / "a.obj", mesh)
-    sb.mesh.write_ply(folder / "a.ply", mesh, face_fields={"strain": np.zeros(len(mesh.triangles))})
-    x, t = mesh.vertices.tolist(), mesh.triangles.tolist()
-    head = ["ply", "format ascii 1.0", "comment TextureFile a.png", "element vertex 9"]
-    head += [f"property float {axis}" for axis in "xyz"]
-    head += [f"element face {len(t)}", "property list uchar int vertex_indices", "end_header"]
-    rows = [f"{a} {b} {c}" for a, b, c in x] + [f"3 {a} {b} {c}" for a, b, c in t]
-    facets = []
-    for row in t:
-        corners = [f"vertex {a} {b} {c}" for a, b, c in (x[k] for k in row)]
-        facets += ["facet normal 0 0 1", "outer loop", *corners, "endloop", "endfacet"]
-    binary_stl = bytes(80) + len(t).to_bytes(4, "little")
-    for row in t:
-        binary_stl += np.array([[0, 0, 1], *(x[k] for k in row)], dtype="<f4").tobytes() + b"\0\0"
-    return [
-        {"a.obj": (folder / "a.obj").read_bytes()},
-        {"a.ply": (folder / "a.ply").read_bytes()},
-        {"a.ply": "\n".join([*head, *rows, ""]).encode()},
-        {"a.stl": "\n".join(["solid a", *facets, "endsolid a", ""]).encode()},
-        {"a.stl": binary_stl},
-    ]
-
-
-def _curves(folder: Path) -> list[Files]:
-    rows = "".join(f"{k / 10:.1f};{k * k / 7:.3f}\n" for k in range(9)).replace(".", ",")
-    semicolons = f"Width;50;mm\nWeg [mm];Kraft [N]\n{rows}"
-    rows = "".join(f"{k}\t{k / 9:.4f}\t{k / 5:.3f}\n" for k in range(9))
-    tabs = f"Gauge length\t20 cm\nTime (s)\tLoad (N)\tExtension (mm)\n{rows}"
-    repeats = "strain %, force_N, strain %, force_N\n" + "".join(f"{k},{k}.5,{k},{k}.25\n" for k in range(9))
-    latin = "Dehnung in %  Kraft/cN\n" + "".join(f"{k}  1'{k:03}.5\n" for k in range(9))
-    files = (semicolons.encode(), tabs.encode("utf-16"), repeats.encode(), latin.encode("cp1252"))
-    return [{"strip.csv": content} for content in files]
-
-
-def _poses(folder: Path) -> list[Files]:
-    rows = "".join(f"{k / 10},{k},0,{k / 7:.3f},0,0,{k / 9:.4f},1\n" for k in range(9))
-    np.savez(folder / "tool.npz", times=np.arange(4.0), positions=np.zeros((4, 3)), quaternions=np.ones((4, 4)))
-    header = "time,x,y,z,qx,qy,qz,qw\n"
-    return [{"tool.csv": (header + rows).encode()}, {"tool.npz": (folder / "tool.npz").read_bytes()}]
-
-
-def _scenes(folder: Path) -> list[Files]:
-    rope = sb.rope(0.3, 4, density=0.05, EI=1e-3, bend_damping=0.01, drag_linear=0.01, clamp_start=(1, 0, 0))
-    cloth, mesh = sb.Scene("cloth"), sb.mesh.grid(0.2, 0.2, 2, 2, pattern="one_way")
-    made = sb.add_cloth(cloth, mesh, density=0.1, warp=40.0, shear=10.0, bending=1e-4)
-    cloth.drive(made.particles[:1], [0.0, 0.1, 0.2], np.zeros((3, 1, 3)))
-    for scene in (rope, cloth):
-        sb.save_scene(scene, folder / f"{scene.name}.scene")
-    return [{"a.scene": (folder / f"{name}.scene").read_bytes()} for name in ("rope", "cloth")]
-
-
-def _forces(folder: Path) -> list[Files]:
-    times, forces = np.arange(5) / 100, np.random.default_rng(2).normal(size=(5, 3))
-    sb.ForceRecording(times, forces, torques=forces, quaternions=np.ones((5, 4))).save(folder / "f.npz")
-    table = "time_ms,fx,fy,fz,tx,ty,tz\n" + "".join(f"{10 * k},{k}.5,-1,,{k},0,1e-3\n" for k in range(9))
-    cell = "time,fz\n0,1\n0.01,2\n0.02,nan\n"
-    archive = (folder / "f.npz").read_bytes()
-    return [{"f.csv": table.encode()}, {"f.csv": cell.encode()}, {"f.npz": archive}]
-
-
-def _journals(folder: Path) -> list[Files]:
-    with journal.Journal(folder / "a.sqlite", {"[fit]": "abc"}):
-        _evaluated()
-    return [{"a.sqlite": (folder / "a.sqlite").read_bytes()}]
-
-
-# ---- readers --------------------------------------------------------------------------------------------
 
 
 def _recording(path: Path) -> None:
@@ -245,23 +61,32 @@ def _curve(path: Path) -> None:
     read_curves(path, length=0.2, width="Width")
 
 
+def _cloud(path: Path) -> None:
+    sb.Cloud.load(path).summary()
+
+
+def _many(path: Path) -> None:
+    sb.ManyFit.load(path.with_suffix(".json")).report()
+
+
+def _outline(path: Path) -> None:
+    found = read_outline(path, units="mm", width=0.3)
+    assert found.area >= 0.0 and found.nodes >= 2
+
+
+def _scene_with_fabric(path: Path) -> None:
+    config.parse(path.with_name("flag.toml"))
+
+
 def _scene(path: Path) -> None:
     assert sb.load_scene(path).compiled
-
-
-def _evaluated() -> list[bytes]:
-    """A problem's residuals and Jacobian, or residuals alone, at a few points."""
-    problem = test_journal.problem_of(test_journal.swinging())
-    points = [problem.parameters.initial() + 0.01 * k for k in range(4)]
-    found = [problem.evaluate(u, jacobian=bool(k % 2)) for k, u in enumerate(points)]
-    return [r.tobytes() + J.tobytes() for _, r, J in found]
 
 
 def _journal(path: Path) -> None:
     """What it holds counts only with its bits."""
     try:
         with journal.Journal(path, {"[fit]": "abc"}):
-            assert _evaluated() == _evaluated_without()
+            assert fuzz_seeds.evaluated() == _evaluated_without()
     finally:
         for end in ("-wal", "-shm"):
             path.with_name(path.name + end).unlink(missing_ok=True)
@@ -271,7 +96,7 @@ def _journal(path: Path) -> None:
 def _evaluated_without() -> list[bytes]:
     kept = journal._current.set(None)
     try:
-        return _evaluated()
+        return fuzz_seeds.evaluated()
     finally:
         journal._current.reset(kept)
 
@@ -291,20 +116,27 @@ def sealed(rng: random.Random, content: bytes, others: list[bytes]) -> bytes:
 
 
 TARGETS: dict[str, Target] = {
-    "csv": Target(_csv, _recording, mutated),
-    "mocap": Target(_mocap, _recording, mutated),
-    "trc": Target(_trc, _recording, mutated),
-    "npz": Target(_npz, _recording, packed),
-    "npy": Target(_npy, _recording, mutated),
-    "pickle": Target(_pickles, _recording, mutated),
-    "c3d": Target(_c3d, _recording, mutated),
-    "json": Target(_sidecar, _beside, json_tree),
-    "toml": Target(_toml, _configuration, toml_tree),
-    "fit": Target(_fits, _fit, json_tree),
-    "mesh": Target(_meshes, sb.read_mesh, mutated),
-    "curve": Target(_curves, _curve, mutated),
-    "poses": Target(_poses, sb.Tool.load, mutated),
-    "scene": Target(_scenes, _scene, sealed),
-    "forces": Target(_forces, sb.ForceRecording.load, mutated),
-    "journal": Target(_journals, _journal, database),
+    "csv": Target(fuzz_seeds.csv, _recording, mutated),
+    "mocap": Target(fuzz_seeds.mocap, _recording, mutated),
+    "trc": Target(fuzz_seeds.trc, _recording, mutated),
+    "npz": Target(fuzz_seeds.npz, _recording, packed),
+    "npy": Target(fuzz_seeds.npy, _recording, mutated),
+    "pickle": Target(fuzz_seeds.pickles, _recording, mutated),
+    "c3d": Target(fuzz_seeds.c3d, _recording, mutated),
+    "json": Target(fuzz_seeds.sidecar, _beside, json_tree),
+    "toml": Target(fuzz_seeds.toml, _configuration, toml_tree),
+    "fit": Target(fuzz_seeds.fits, _fit, json_tree),
+    "mesh": Target(fuzz_seeds.meshes, sb.read_mesh, mutated),
+    "curve": Target(fuzz_seeds.curves, _curve, mutated),
+    "cloud": Target(fuzz_seeds.clouds, _cloud, packed),
+    "solid": Target(fuzz_seeds.solids, sb.mesh.read_solid, mutated),
+    "outline": Target(fuzz_seeds.outlines, _outline, mutated),
+    "fabric": Target(fuzz_seeds.fabrics, _scene_with_fabric, toml_tree),
+    "fabric_tests": Target(fuzz_seeds.fabric_tests, load_fabric_tests, toml_tree),
+    "many": Target(fuzz_seeds.many, _many, json_tree),
+    "many_table": Target(fuzz_seeds.tables_of_many, _many, mutated),
+    "poses": Target(fuzz_seeds.poses, sb.Tool.load, mutated),
+    "scene": Target(fuzz_seeds.scenes, _scene, sealed),
+    "forces": Target(fuzz_seeds.forces, sb.ForceRecording.load, mutated),
+    "journal": Target(fuzz_seeds.journals, _journal, database),
 }

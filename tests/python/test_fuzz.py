@@ -30,7 +30,15 @@ CASES = {
     "scene": 400,
     "forces": 500,
     "journal": 150,
+    "cloud": 300,
+    "solid": 300,
+    "outline": 200,
+    "fabric": 200,
+    "fabric_tests": 100,
+    "many": 300,
+    "many_table": 300,
 }
+NEEDS = {"mesh": "trimesh", "solid": "meshio", "outline": "contourpy"}
 
 
 def lines_of(command: list[object]) -> tuple[int, dict[str, dict[str, Any]]]:
@@ -44,7 +52,7 @@ def lines_of(command: list[object]) -> tuple[int, dict[str, dict[str, Any]]]:
 @pytest.fixture(scope="module")
 def fed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
     """What the program says of each reader, after one start."""
-    readers = [f"{name}:{cases}" for name, cases in CASES.items() if name != "mesh" or find_spec("trimesh")]
+    readers = [f"{name}:{cases}" for name, cases in CASES.items() if find_spec(NEEDS.get(name, "sheetbend"))]
     command = [sys.executable, PROGRAM, *readers, "--seed", "5", "--keep", tmp_path_factory.mktemp("fuzzed")]
     return lines_of(command)[1]
 
@@ -52,8 +60,7 @@ def fed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
 @pytest.mark.slow
 @pytest.mark.parametrize("reader", CASES)
 def test_no_mutated_file_does_harm(fed: dict[str, dict[str, Any]], reader: str) -> None:
-    if reader == "mesh":
-        pytest.importorskip("trimesh")
+    pytest.importorskip(NEEDS.get(reader, "sheetbend"))
     told = fed[reader]
     assert "ended" not in told and told["cases"] == CASES[reader] and told["findings"] == [], told
     assert told["outcomes"].get("read", 0) > 0  # else the mutations are too wild to get anywhere

@@ -106,6 +106,32 @@ def test_files_that_are_no_solid(tmp_path):
         sb.mesh.read_solid(tmp_path / "box.step")
 
 
+LARGEST = b"\xff\xff\xff\x7f"
+
+
+@pytest.mark.parametrize(
+    ("version", "binary", "old", "new"),
+    [
+        ("2.2", True, b"\n8\n", b"\n4294967296\n"),
+        ("2.2", False, b"\n8 ", b"\n2147483647 "),
+        ("4.0", True, b"\x08\x00\x00\x00" + sb.mesh.bricks((0.2, 0.1, 0.1), (1, 1, 1)).vertices[7].tobytes(), LARGEST),
+        ("4.1", True, b"\x07" + bytes(7) + b"\x08", b"\x07\x00\x00\x00\x01"),
+        ("4.1", False, b"\n8\n", b"\n4294967296\n"),
+    ],
+)
+def test_a_number_of_a_node_asks_for_no_memory(tmp_path, version, binary, old, new):
+    """Some 2 kB that named node 4,294,967,296 took 32 GB."""
+    meshio = pytest.importorskip("meshio")
+    box, path = sb.mesh.bricks((0.2, 0.1, 0.1), (1, 1, 1)), tmp_path / "box.msh"
+    mesh = meshio.Mesh(box.vertices, [("hexahedron", box.elements)])
+    meshio.gmsh.write(path, mesh, fmt_version=version, binary=binary)
+    content = path.read_bytes()
+    assert old in content and len(sb.mesh.read_solid(path).vertices) == 8
+    path.write_bytes(content.replace(old, new + old[len(new) :] if binary else new, 1))
+    with pytest.raises(sb.MeshError, match="nodes: have numbers whose table takes"):
+        sb.mesh.read_solid(path)
+
+
 def test_tetrahedra_are_told_by_how_much_they_lock():
     """A silicone beam of 10 x 3 x 3 cells: 6 times too stiff, hardly so where the material is compressible."""
     mesh = sb.mesh.tetrahedra((0.1, 0.03, 0.03), (10, 3, 3))

@@ -132,6 +132,8 @@ def _at(field: str) -> Iterator[None]:
     """What goes wrong names its table."""
     try:
         yield
+    except ConfigError:  # names it already
+        raise
     except InputError as error:
         own = {"path": "files"}.get(error.field, error.field)
         named = f"{field}.{own}" if own in Pull.model_fields else f"{field}: {own}"

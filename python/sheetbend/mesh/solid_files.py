@@ -15,6 +15,7 @@ from ..errors import MeshError
 from ..files.door import note, reading
 from ..files.units import METERS
 from ..optional import require
+from .gmsh_nodes import check_nodes
 from .solid_mesh import SolidMesh
 
 FORMATS = {".msh": "gmsh", ".vtk": "vtk", ".vtu": "vtu", ".inp": "abaqus", ".mesh": "medit"}
@@ -50,6 +51,8 @@ def _mesh(path: Path, meters: float) -> SolidMesh:
         raise MeshError("path", "has a suffix that no reader knows", str(path), f"use one of {', '.join(FORMATS)}")
     if not path.is_file():
         raise MeshError("path", "is no file", str(path), "check the path; it starts at the working directory")
+    if path.suffix.lower() == ".msh":
+        check_nodes(path)
     content = _load(path)
     blocks: dict[str, list[Any]] = {}
     for block in content.cells:

@@ -138,12 +138,12 @@ class ManyFit:
             if (kind := data.pop("format", None)) != FORMAT:
                 raise InputError(f"{path}: format", "is not the one that this version reads", kind, f"use {FORMAT!r}")
             data.pop("table", None)
-            own = [as_dataclass(_Distribution, part, f"own[{i}]") for i, part in enumerate(data["own"])]
-            count = as_type(int, data["recordings"], "recordings")
+            own: tuple[_Distribution, ...] = as_type(tuple[_Distribution, ...], data.get("own"), "own")
+            count = as_type(int, data.get("recordings"), "recordings")
         table = path.with_suffix(".csv")
         with reading(table, InputError):
             header, *rows = csv.reader(io.StringIO(bounded_bytes(table, ROOM, InputError).decode()))
-            if header != _header(own) or len(rows) != count:
+            if header != _header(own) or len(rows) != count or any(len(row) != len(header) for row in rows):
                 fix = "keep the two files that ManyFit.save wrote together"
                 raise InputError(str(table), f"is not the table of {path.name}", f"{len(rows)} rows", fix)
             numbers = np.array([[float(x) if x else math.nan for x in row[1:]] for row in rows])
