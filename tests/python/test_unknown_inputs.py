@@ -25,6 +25,7 @@ from sheetbend.minimum.smooth import with_fields
 from sheetbend.objects.over_time import modes_of_times
 from sheetbend.page.of_fit import result_page
 from sheetbend.result.bootstrap import Bootstrap, BootstrapInterval
+from sheetbend.statistics.intervals import NORMAL
 
 NOISE, PUSH = 5e-4, {"scale": 0.02, "spacing": 0.05, "duration": 0.5}
 TIMES, SOLVER = np.arange(31) / 60, sb.Solver(h=1 / 300)
@@ -275,7 +276,7 @@ def test_a_plan_tells_what_is_left_of_a_force() -> None:
     weights = np.full(11, 0.1)
     weights[[0, -1]] = 0.05
     mean = np.sqrt(weights @ np.mean(np.square(found.half_widths), axis=1))
-    assert push.half_width == pytest.approx(mean, rel=0.15) and push.prior == pytest.approx(1.96 * 0.02)
+    assert push.half_width == pytest.approx(mean, rel=0.15) and push.prior == pytest.approx(NORMAL * 0.02)
     assert "Unknown inputs over time" in plan.report() and "push_x_1" not in plan.report()
     half = {v.name: v.half_widths for v in plan.variants}["the same recordings once more"]
     known = plan["rope_EI"].half_width

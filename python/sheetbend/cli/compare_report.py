@@ -10,6 +10,7 @@ from typing import Any
 from ..quantities.wording import figures, short
 from ..report.tables import Section
 from ..result.estimate import Estimate
+from ..statistics.intervals import NORMAL
 from ..statistics.paired import FEWEST, Paired
 from .written_fits import Written
 
@@ -93,7 +94,7 @@ def _apart(first: Written, other: Written) -> list[str]:
         o = next((o for o in first.result.estimates if o.name == e.name), None)
         if o is None or e.half_width is None or o.half_width is None:
             continue
-        sd = math.hypot(e.half_width, o.half_width) / 1.96
+        sd = math.hypot(e.half_width, o.half_width) / NORMAL
         if sd > 0.0 and abs(e.value - o.value) > _APART * sd:
             found.append(f"{e.name} is {abs(e.value - o.value) / sd:.2g} standard deviations from that of {first.name}")
     return found

@@ -19,7 +19,6 @@ from ..scene.scene import Scene
 from . import schema
 from .contacts import check_solver
 from .errors import located
-from .forces import force_sensors
 from .held import assumptions
 from .marker_places import Listed
 from .moment import Moment
@@ -34,6 +33,7 @@ from .recordings import (
 )
 from .rest import check_rest
 from .scenes import build_scene
+from .sensors import force_sensors
 from .shown import ropes_shown, with_grids, with_own_markers, without
 from .solver_schema import solver_for
 from .start_values import check_names, fields_of_parameter, set_start_values

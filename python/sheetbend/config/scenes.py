@@ -23,15 +23,13 @@ from .cloth_markers import seats
 from .cloths import build_cloth, placed_mesh
 from .contacts import add_contacts
 from .errors import located, of_name
-from .forces_on import add_forces
+from .loads import add_forces, add_unknown_inputs, add_winds
 from .moment import Moment
 from .particles import Particles
 from .rope_points import Seats
 from .ropes import build_rope
 from .solids import build_solid
 from .tools import tool_named
-from .unknown_inputs import add_unknown_inputs
-from .winds import add_winds
 
 T = TypeVar("T")
 EARTH = (0.0, 0.0, -9.81)  # m/s^2

@@ -225,23 +225,27 @@ def _observe(
     if boundary.driven and not e.scene.contacts.contacts:  # a table would have to move as well
         for way, moved in aside:
             yield change(f"{ASIDE} {way}", "drive_place", moved)
-    if not held or boundary.driven:  # what is driven goes where it was measured
-        return
-    for way, moved in aside:
-        yield change(f"clamps along {way}", "clamps", moved)
-    arm = shown - start[held].mean(axis=0)
-    yield change(LARGER, "recording_size", arm, relative=True)
-    if len(e.scene.air.triangles) or len(e.scene.forces.particles):
-        return  # which would have to turn as well
-    # To turn the clamps is to turn everything, with the gravity turned back.
-    down = e.scene.gravity
+    if held and not boundary.driven:  # what is driven goes where it was measured
+        for way, moved in aside:
+            yield change(f"clamps along {way}", "clamps", moved)
+        arm = shown - start[held].mean(axis=0)
+        yield change(LARGER, "recording_size", arm, relative=True)
+        if not len(e.scene.air.triangles) and not len(e.scene.forces.particles):  # which would have to turn as well
+            yield from _turned_clamps(e, arm, change, by_gravity)
+
+
+def _turned_clamps(
+    e: Experiment, arm: Array, change: Callable[[str, str, Array], Told], by_gravity: Mapping[int, Array]
+) -> Iterator[Told]:
+    """To turn the clamps is to turn everything, the markers at `arm` (frames, markers, 3) m from them, with the gravity
+    turned back."""
     for axis in range(3):
         turn = np.eye(3)[axis]
         turned = change(f"clamps about {AXES[axis]}", "clamp_direction", np.cross(turn, arm))
         g = turned.column
         for toward, column in by_gravity.items():
             across = gravity_turns(e)[toward]
-            g = g + column[own] * float(np.cross(down, turn) @ across) / float(across @ across)
+            g = g + column[: len(g)] * float(np.cross(e.scene.gravity, turn) @ across) / float(across @ across)
         yield replace(turned, column=g)
 
 

@@ -34,9 +34,9 @@ from ..recording.recording import Recording
 from ..report.fit_result import FitResult
 from ..result.estimate import Estimate
 from ..scene.scene import Scene
-from .conclusion import Asked, Systematic, conclude
+from .conclusion import Asked, Conclusion, Systematic, conclude
 from .experiments import experiments_of
-from .reached import reach
+from .reached import Reached, reach
 from .result_of import Clock, result_of
 
 
@@ -221,15 +221,7 @@ def fit(
         reached = reach(replace(search, windows=(), starts=()), problem, beginnings, stopped)
     if reached.all_lost:
         asked = asked.without_refits()
-    refitter, interrupted = reached.found.optimizer, reached.interrupted
-    left_out: dict[str, Comparison] = {}
-    try:
-        conclusion = conclude(reached, experiments, wanted, asked, None if interrupted else refitter)
-        if leave_one_out and not interrupted:
-            left_out = each_left_out(fitted, wanted, conclusion.values, refitter, threads)
-    except KeyboardInterrupt:
-        interrupted = True
-        conclusion = conclude(reached, experiments, wanted, asked, None)
+    conclusion, left_out, interrupted = _concluded(reached, experiments, wanted, asked, leave_one_out)
     corrected = conclusion.at.problem.corrections(conclusion.at.u) | conclusion.corrected
     at = {e.name: conclusion.at.problem.experiment_at(i, conclusion.at.u) for i, e in enumerate(fitted)}
     found = [at.get(e.name, e) for e in conclusion.experiments]
@@ -240,6 +232,22 @@ def fit(
             result, warnings=(*result.warnings, f"SciPy stands in for Ceres, which does not load: {trouble}")
         )
     return Fit(result, tuple(comparisons), wanted, corrected, conclusion.values)
+
+
+def _concluded(
+    reached: Reached, experiments: Sequence[Experiment], wanted: Parameters, asked: Asked, leave_one_out: bool
+) -> tuple[Conclusion, dict[str, Comparison], bool]:
+    """What follows from the minimum, how each recording is predicted by a fit to the others, and whether Ctrl-C came:
+    then nothing is refitted."""
+    refitter, interrupted = reached.found.optimizer, reached.interrupted
+    left_out: dict[str, Comparison] = {}
+    try:
+        conclusion = conclude(reached, experiments, wanted, asked, None if interrupted else refitter)
+        if leave_one_out and not interrupted:
+            left_out = each_left_out(_fitted(experiments), wanted, conclusion.values, refitter, asked.threads)
+        return conclusion, left_out, interrupted
+    except KeyboardInterrupt:
+        return conclude(reached, experiments, wanted, asked, None), {}, True
 
 
 def _fitted(experiments: Sequence[Experiment]) -> list[Experiment]:

@@ -35,7 +35,7 @@ from ..result.estimate import Estimate
 from ..scene.scene import Scene
 from ..statistics.identifiability import Identifiability
 from ..statistics.identifiability import identify as judged
-from ..statistics.intervals import open_estimate
+from ..statistics.intervals import NORMAL, open_estimate
 from ..statistics.judge import Nuisance
 from ..statistics.layout import Layout
 from .experiments import experiments_of
@@ -46,7 +46,6 @@ DRAWS = 11  # of the noise; odd, so that there is one in the middle
 KNOWN = 0.05  # of a logarithm or a natural scale: combinations that are known so well are not named
 TAKES_PART = 0.2  # of the weakest combination's largest part
 SEED = 8
-NORMAL = 1.96  # standard deviations in the half-width of a 95 % interval
 
 
 @dataclass(frozen=True)

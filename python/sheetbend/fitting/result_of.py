@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -88,7 +87,8 @@ def result_of(
     estimates, limit = at_the_limit(doubtful(judged.estimates, contradicted, missed), at.refits, parameters, at.u)
     values = conclusion.values | parameters.to_physical(limit)
     each = every_end(reached.ends, found.raced)
-    effort = _effort(reached, clock)
+    searched = sum(m.evaluations for m in reached.ends), sum(m.jacobians for m in reached.ends)
+    evaluations, jacobians = clock.since()
     contacts = what_touches(at.problem, at.u)
     warnings = (
         *warnings_of([m for m, _ in each], interrupted, problem, estimates, ahead),
@@ -135,9 +135,9 @@ def result_of(
         over_time=found_fields.over_time(),
         kinks=() if interrupted else kinks(at.problem, at.u, estimates),
         windows=best.windows,
-        evaluations=effort.evaluations,
-        jacobians=effort.jacobians,
-        judging=effort.judging,
+        evaluations=searched[0],
+        jacobians=searched[1],
+        judging=(evaluations - searched[0], jacobians - searched[1]),
         warnings=warnings,
     )
     return replace(result, estimates=with_dependences(result))
@@ -170,18 +170,3 @@ def _contradicted(
         | elsewhere(problem, conclusion.judged, best.cost, [*other_starts, *conclusion.lower])
         | conclusion.contradicted
     )
-
-
-class _Effort(NamedTuple):
-    """How many evaluations and Jacobians the searches took, and how many of both what follows from them."""
-
-    evaluations: int
-    jacobians: int
-    judging: tuple[int, int]
-
-
-def _effort(reached: Reached, clock: Clock) -> _Effort:
-    """Up to now."""
-    searches = sum(m.evaluations for m in reached.ends), sum(m.jacobians for m in reached.ends)
-    evaluations, jacobians = clock.since()
-    return _Effort(*searches, (evaluations - searches[0], jacobians - searches[1]))

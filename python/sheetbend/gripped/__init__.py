@@ -1,7 +1,7 @@
 """Ropes held by two grips: from recordings to stiffness, twist, damping, rest shape and yield."""
 
 from .evaluation import Evaluation, evaluate
-from .ladder import LADDER, Rung
+from .ladder import LADDER, WITHOUT_TWIST, Rung
 from .model import RopeModel
 from .motion import GrippedMotion
 from .recipe import RopeFit, fit_rope
@@ -9,7 +9,6 @@ from .report import RopeReport
 from .screening import Screened, screened
 from .steps import Step
 from .trades import trades
-from .without_twist import WITHOUT_TWIST
 
 __all__ = [
     "LADDER",

@@ -8,7 +8,6 @@ descent ends where the next step promises less than a tenth.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -113,13 +112,7 @@ def bearable(problem: FitProblem, cost: float) -> bool:
     return bool(cost < 0.5 * problem.core.data_rows * max(worst) ** 2)
 
 
-def descend(
-    problem: FitProblem,
-    most: int,
-    enough: float = 0.0,
-    sure: bool = True,
-    followed: Callable[[int, float], None] = lambda iteration, cost: None,
-) -> Descent:
+def descend(problem: FitProblem, most: int, enough: float = 0.0, sure: bool = True) -> Descent:
     """Down from where the problem starts; a state that diverges costs infinitely much, so that the last finite one
     stays.
 
@@ -127,7 +120,6 @@ def descend(
         most: steps that follow a derivative of their own.
         enough: share of the cost that a step must promise and take off, where that is more than `negligible`.
         sure: whether the last step has to follow a derivative of its own; not where another search goes on from there.
-        followed: called with each step's number and cost.
     """
     walk = Sparing(problem, problem.parameters.initial())
     least, ended, first = max(enough, negligible(problem)), False, walk.cost
@@ -137,7 +129,6 @@ def descend(
         if not walk.step():  # nothing left to promise, or no shorter step helps
             ended = walk.promised < max(least, STUCK) or walk.promised * walk.cost <= ROUNDING * first
             break
-        followed(walk.iterations, walk.cost)
         if walk.promised < least or walk.taken < enough:
             if walk.sure or not sure:
                 ended = True

@@ -167,4 +167,14 @@ MARKERS = Rung(
     each_marker=(_plain("place_{}", "m", 0.005, 0.005),),
     small=True,
 )
+RATIO = 0.01  # GJ/EI that counts as none: thrice as much moves errors by 3 %, a tenth lets motions diverge
+WITHOUT_TWIST = Rung(
+    "straight, without twist",
+    parameters=(
+        *(p for p in TWIST.parameters if p.name not in (f"{NAME}_GJ", f"{NAME}_roll")),
+        Parameter(name=f"{NAME}_GJ", tied_to=f"{NAME}_EI", factor=RATIO, unit="N m^2"),
+    ),
+)
+"""A first rung for comparison, of a rope that bends, but does not resist torsion: with GJ negligible; a built-in twist
+then does nothing, so no roll is fitted."""
 LADDER = (TWIST, TILTS, REST, VARYING, YIELD, ROLLS, CLOCK, BESIDE, SHIFTS, MARKERS)

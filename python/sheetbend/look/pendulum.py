@@ -160,9 +160,7 @@ def _joints(s: Seen) -> list[int] | None:
 
 def _change(s: Seen, a: int, b: int) -> float:
     """How much the distance of two markers changes, relative to it, beyond what noise makes."""
-    by_noise = math.sqrt(2.0) * s.noise
-    spread = float(np.nanstd(_distance(s.recording.positions, a, b)))
-    return math.sqrt(max(spread**2 - by_noise**2, 0.0)) / float(s.apart[a, b])
+    return _beyond(s, a, b, 2.0 * s.noise**2)
 
 
 def _drift(s: Seen, a: int, b: int) -> float:
@@ -174,7 +172,13 @@ def _drift(s: Seen, a: int, b: int) -> float:
         return 0.0
     noise = white_variance(before[seen], here[seen], after[seen])
     by_chance = CHANCE / math.sqrt(np.isfinite(distance).sum())
-    return math.sqrt(max(float(np.nanvar(distance)) - (1.0 + by_chance) * noise, 0.0)) / float(s.apart[a, b])
+    return _beyond(s, a, b, (1.0 + by_chance) * noise)
+
+
+def _beyond(s: Seen, a: int, b: int, variance: float) -> float:
+    """How much the distance of two markers changes, relative to it, beyond a variance."""
+    changes = float(np.nanvar(_distance(s.recording.positions, a, b)))
+    return math.sqrt(max(changes - variance, 0.0)) / float(s.apart[a, b])
 
 
 def _bends(x: Array) -> bool:

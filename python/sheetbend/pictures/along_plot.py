@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..result.field import FieldFit
-from .drawing import ACCENT, GRAY, INK, PALE, clean, key, panels_in
+from .drawing import FOUND, GRAY, band, clean, key, panels_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,16 +30,14 @@ def plot_along(found: FieldFit, *, title: str = "", ax: Axes | None = None) -> A
     panels, whole = panels_in(ax, 1 if ax is not None else 2, (7.2, 4.4), title or found.name)
     s, E, half = np.array(found.centers)[:, 0], np.array(found.stiffness), np.array(found.half_widths)
     clean(panels[0])
-    panels[0].fill_between(s, E * np.exp(-half), E * np.exp(half), color=PALE, linewidth=0)
-    panels[0].plot(s, E, color=ACCENT, linewidth=1.3)
+    band(panels[0], s, E, E * np.exp(-half), E * np.exp(half))
     panels[0].set_ylabel(f"EI [{found.unit}]")
     for panel in panels[1:]:
         clean(panel)
         panel.plot(s, 100 * np.array(found.left), color=GRAY, linewidth=1.3)
         panel.set_ylabel("left of the prior [%]")
         panel.set_ylim(bottom=0.0)
-    for panel in panels:
         panel.margins(x=0)
     panels[-1].set_xlabel("along the rope [m]")
-    key(whole, [("found", ACCENT), ("shaded: 95 % interval", INK)])
+    key(whole, FOUND)
     return panels[0]

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 INK, GRAY, PALE, ACCENT, WARM = "#22262b", "#8a9099", "#eef0f2", "#0b6e8c", "#c8553d"
 """One palette: measured is gray, simulated is the accent, what needs attention is warm."""
+FOUND = [("found", ACCENT), ("shaded: 95 % interval", INK)]
+"""The key of `band`."""
 
 
 def new_figure(width: float, height: float, title: str) -> Figure:
@@ -50,6 +52,13 @@ def key(parent: Axes | Figure, entries: Sequence[tuple[str, str]]) -> None:
     parent.add_artist(
         boxes.AnnotationBbox(row, (1, 1), box_alignment=corner, xycoords=coordinates, frameon=False, pad=0, **offset)
     )
+
+
+def band(panel: Axes, x: np.ndarray, values: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> None:
+    """What a fit found along x (line) and its 95 % intervals (band); `FOUND` is the key."""
+    panel.fill_between(x, lower, upper, color=PALE, linewidth=0)
+    panel.plot(x, values, color=ACCENT, linewidth=1.3)
+    panel.margins(x=0)
 
 
 def strip(panel: Axes, label: str, *, share: float = 0.25) -> Axes:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..result.over_time import OverTimeFit
-from .drawing import ACCENT, GRAY, INK, PALE, clean, key, panels_in
+from .drawing import FOUND, GRAY, band, clean, key, panels_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,10 +38,8 @@ def plot_over_time(
     for k, panel in enumerate(panels):
         clean(panel)
         panel.axhline(0.0, color=GRAY, linewidth=0.6)
-        panel.fill_between(found.times, values[:, k] - half[:, k], values[:, k] + half[:, k], color=PALE, linewidth=0)
-        panel.plot(found.times, values[:, k], color=ACCENT, linewidth=1.3)
-        panel.margins(x=0)
+        band(panel, np.array(found.times), values[:, k], values[:, k] - half[:, k], values[:, k] + half[:, k])
         panel.set_ylabel(f"{found.kind} {AXES[k]} [{found.unit}]")
     panels[-1].set_xlabel("time [s]")
-    key(whole, [("found", ACCENT), ("shaded: 95 % interval", INK)])
+    key(whole, FOUND)
     return np.array(panels)

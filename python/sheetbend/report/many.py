@@ -19,6 +19,7 @@ from ..files.typed import as_dataclass, as_type, mapping
 from ..files.whole import write_text
 from ..quantities.wording import short
 from ..result.estimate import Estimate, estimate_of
+from ..statistics.intervals import NORMAL
 from .report import estimate_row
 from .tables import Section, plain_section
 
@@ -213,5 +214,5 @@ def _typical(p: OwnParameter) -> str:
     known = [x for x in p.sds if not math.isnan(x)]
     if not known:
         return "open"
-    half = 1.96 * float(np.median(known))
+    half = NORMAL * float(np.median(known))
     return f"{short(100 * half, 2)} %" if p.log else f"{short(half, 2)} {p.unit}".rstrip()

@@ -77,7 +77,7 @@ def bias_extension(
     rest = flat_rest(scene, cloth, start, jaw_travel=extension)
 
     own = ("jaw_travel",)
-    force, by = jaw_force(rest, "jaw", 0)
+    force, by = jaw_force(rest, 0)
     by_force = combined((1.0, by), leave=own)
     middle = np.abs(x[cloth.mesh.triangles].mean(axis=1)[:, :2] - [length / 2.0, width / 2.0]).sum(axis=1) < width / 4.0
     angle, bar = _shear_angle(rest, np.flatnonzero(middle))

@@ -82,8 +82,9 @@ def flat_rest(scene: Scene, cloth: Cloth, start: ArrayLike, **settings: float) -
     return equilibrium(scene, x, settings)
 
 
-def jaw_force(rest: Equilibrium, name: str, axis: int) -> tuple[float, dict[str, float]]:
-    """Force of a jaw on the cloth along an axis, N, and its derivative with respect to every quantity."""
-    bar = np.zeros_like(rest.forces[name])
+def jaw_force(rest: Equilibrium, axis: int) -> tuple[float, dict[str, float]]:
+    """Force of the "jaw" on the cloth along an axis, N, and its derivative with respect to every quantity."""
+    forces = rest.forces["jaw"]
+    bar = np.zeros_like(forces)
     bar[:, axis] = 1.0
-    return float(rest.forces[name][:, axis].sum()), rest.gradient(None, {name: bar})
+    return float(forces[:, axis].sum()), rest.gradient(None, {"jaw": bar})

@@ -28,17 +28,17 @@ _LEVELS = 3  # of a bias extension
 _LARGEST_SHEAR = 0.6  # of the extension at which the yarns of a trellis would lie side by side
 
 
-def weighed(values: Sequence[float], error: float = MACHINE) -> Measured:
+def weighed(values: Sequence[float]) -> Measured:
     """Weight per area, g/m^2, of some specimens."""
-    return _of("weight", values, lambda f: Reading(f.density, "kg/m^2", {"cloth_density": 1.0}, "g/m^2", 1e3), error)
+    return _of("weight", values, lambda f: Reading(f.density, "kg/m^2", {"cloth_density": 1.0}, "g/m^2", 1e3))
 
 
-def bending_lengths(values: Sequence[float], along: str, error: float = MACHINE) -> Measured:
+def bending_lengths(values: Sequence[float], along: str) -> Measured:
     """Bending lengths, mm, of strips along the warp or the weft (`cantilever`)."""
-    return _of(f"bending length, {along}", values, lambda f: cantilever(f, along).bending_length, error)
+    return _of(f"bending length, {along}", values, lambda f: cantilever(f, along).bending_length)
 
 
-def rigidities(curves: Sequence[Curve], along: str, cycle: int = 0, error: float = MACHINE) -> Measured:
+def rigidities(curves: Sequence[Curve], along: str, cycle: int) -> Measured:
     """B of bending loops (`bending_loop`): the fabric's own rigidity."""
     values = [bending_loop(curve, cycle).rigidity for curve in _tests(curves, "bending")]
 
@@ -48,19 +48,17 @@ def rigidities(curves: Sequence[Curve], along: str, cycle: int = 0, error: float
         name = "cloth_bending_weft" if own else "cloth_bending"
         return Reading(value, "N m", {name: 1.0}, values[0].laboratory_unit, values[0].per)
 
-    return _of(f"B, {along}", [v.laboratory for v in values], test, error)
+    return _of(f"B, {along}", [v.laboratory for v in values], test)
 
 
-def shear_stiffness(
-    values: Sequence[float] | Sequence[Curve], along: str, cycle: int = 0, error: float = MACHINE
-) -> Measured:
+def shear_stiffness(values: Sequence[float] | Sequence[Curve], along: str, cycle: int) -> Measured:
     """G, gf/(cm deg), of KES shear tests: as read, or of their loops (`shear_loop`)."""
     loops = [v for v in values if isinstance(v, Curve)]
     read = [shear_loop(c, cycle).stiffness.laboratory for c in _tests(loops, "shear")] if loops else values
-    return _of(f"G, {along}", read, lambda f: shear(f, along).stiffness, error)  # type: ignore[arg-type]
+    return _of(f"G, {along}", read, lambda f: shear(f, along).stiffness)  # type: ignore[arg-type]
 
 
-def bias_pulled(curves: Sequence[Curve], cycle: int = 0, error: float = MACHINE) -> list[Measured]:
+def bias_pulled(curves: Sequence[Curve], cycle: int = 0) -> list[Measured]:
     """Forces of strips cut at 45 degrees (`bias_extension`), at even shares of the extension that all reach.
 
     Raises:
@@ -81,7 +79,7 @@ def bias_pulled(curves: Sequence[Curve], cycle: int = 0, error: float = MACHINE)
     found = []
     for strain in reach * np.arange(1, _LEVELS + 1) / _LEVELS:
         forces = [w.load_at(float(strain)) * width / GRAM_FORCE for w in ways]
-        found.append(_of(f"force at {100 * strain:.3g} %, bias", forces, test(float(strain)), error, "bias"))
+        found.append(_of(f"force at {100 * strain:.3g} %, bias", forces, test(float(strain)), "bias"))
     return found
 
 
@@ -128,10 +126,8 @@ def _tests(curves: Sequence[Curve], test: str) -> Sequence[Curve]:
     return curves
 
 
-def _of(
-    name: str, values: Sequence[float], test: Callable[[Fabric], Reading], error: float, specimens: str = ""
-) -> Measured:
+def _of(name: str, values: Sequence[float], test: Callable[[Fabric], Reading], specimens: str = "") -> Measured:
     """The mean, with the error of the instrument in parts of it. Specimens of readings with the same word are the
     same."""
     named = {f"{specimens or name} {k}": float(value) for k, value in enumerate(values, start=1)}
-    return Measured.of_specimens(named, name=name, test=test, error=error * abs(float(np.mean(values))))
+    return Measured.of_specimens(named, name=name, test=test, error=MACHINE * abs(float(np.mean(values))))

@@ -79,11 +79,11 @@ def shear(
         def measure(strain: float, shift: float = shift) -> tuple[float, float, tuple[Equilibrium, dict[str, float]]]:
             start = x * [1.0, 1.0 + strain, 1.0] + shift * x[:, [1]] * [1.0, 0.0, 0.0]
             rest = flat_rest(scene, cloth, start, jaw_shift=shift * gauge, jaw_travel=strain * gauge)
-            force, by = jaw_force(rest, "jaw", 1)
+            force, by = jaw_force(rest, 1)
             return force / (tension * width) - 1.0, by["jaw_travel"] * gauge / (tension * width), (rest, by)
 
         stretch, (rest, across) = root(measure, stretch)
-        force, by = jaw_force(rest, "jaw", 0)
+        force, by = jaw_force(rest, 0)
         kept = -by["jaw_travel"] / across["jaw_travel"]  # the jaw moves so that the tension stays
         gradient = combined((1.0 / width, by), (kept / width, across), leave=own)
         forces.append(Reading(force / width, "N/m", gradient, "gf/cm", 0.01 / GRAM_FORCE))

@@ -65,7 +65,7 @@ def uniaxial(
 
     def measure(strain: float) -> tuple[float, float, tuple[Equilibrium, float, dict[str, float]]]:
         rest = flat_rest(scene, cloth, x * [1.0 + strain, 1.0, 1.0], jaw_travel=strain * gauge)
-        force, by = jaw_force(rest, "jaw", 0)
+        force, by = jaw_force(rest, 0)
         return force / (load * width) - 1.0, by["jaw_travel"] * gauge / (load * width), (rest, force, by)
 
     strain, (rest, force, by) = root(measure, strip_strain(fabric, along, load))
