@@ -2,16 +2,40 @@
 # core/points, core/blocks, adjoint/packs, adjoint/blocks and adjoint/contact), and for every kind of constraint in core/constraints/registry.h one unit with its kernels in colors and
 # one with those in blocks. These units are written here.
 # Renaming the namespace keeps the variants' templates and inline functions apart.
-set(variants portable)
+#
+# A build for this machine has the portable kernels and those of the widest set that its processor runs. Elsewhere it takes the portable ones where the
+# processor lacks that set: results have the same bits, so it is right on every machine. What goes to other machines is built with all sets.
+if(NOT SHEETBEND_KERNELS MATCHES "^(machine|all|portable)$")
+  message(FATAL_ERROR "SHEETBEND_KERNELS: must be machine, all or portable (got '${SHEETBEND_KERNELS}').")
+endif()
 set(has_x86_kernels FALSE)
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   set(has_x86_kernels TRUE)
-  # Sanitizers need minutes per instruction set: there is one.
-  if(NOT SHEETBEND_SANITIZE AND NOT SHEETBEND_PORTABLE_KERNELS)
-    list(APPEND variants v3 v4)
-    set_source_files_properties(core/packs/choose.cpp core/solver/packed_contacts.cpp PROPERTIES COMPILE_DEFINITIONS SHEETBEND_X86_KERNELS)
-  endif()
 endif()
+set(variants portable)
+if(NOT has_x86_kernels OR SHEETBEND_SANITIZE OR SHEETBEND_KERNELS STREQUAL "portable")
+  # Sanitizers need minutes per instruction set: there is one.
+elseif(SHEETBEND_KERNELS STREQUAL "all" OR CMAKE_CROSSCOMPILING)
+  list(APPEND variants v3 v4)
+else()
+  if(NOT SHEETBEND_WIDEST_KERNELS)
+    try_run(ran compiled ${PROJECT_BINARY_DIR}/processor ${PROJECT_SOURCE_DIR}/cmake/processor.cpp
+            CMAKE_FLAGS -DINCLUDE_DIRECTORIES=${PROJECT_SOURCE_DIR} -DCMAKE_CXX_STANDARD=20 RUN_OUTPUT_VARIABLE widest)
+    if(NOT ran EQUAL 0)
+      message(FATAL_ERROR "cmake/processor.cpp did not say what this processor runs. Fix: give -DSHEETBEND_KERNELS=all")
+    endif()
+    set(SHEETBEND_WIDEST_KERNELS ${widest} CACHE INTERNAL "The widest instruction set of kernels that this processor runs")
+  endif()
+  list(APPEND variants ${SHEETBEND_WIDEST_KERNELS})
+  list(REMOVE_DUPLICATES variants)
+endif()
+list(JOIN variants ", " text)
+message(STATUS "sheetbend: kernels ${text}")
+set(choices core/packs/choose.cpp core/solver/packed_contacts.cpp)
+foreach(variant IN LISTS variants)
+  string(TOUPPER ${variant} text)
+  set_property(SOURCE ${choices} APPEND PROPERTY COMPILE_DEFINITIONS SHEETBEND_KERNELS_${text})
+endforeach()
 
 # The kinds in the order of the registry, and of each its header and whether it says `hot = true` or `hot_in_blocks = true` (core/constraints/concept.h).
 set(registry core/constraints/registry.h)
@@ -137,25 +161,33 @@ function(sheetbend_add_kernels variant part)
 endfunction()
 
 set(tables adjoint/packs/kernel_table.cpp adjoint/blocks/kernel_table.cpp adjoint/contact/kernel_table.cpp core/blocks/kernel_table.cpp core/points/kernel_table.cpp)
-set_source_files_properties(${tables} PROPERTIES SKIP_PRECOMPILE_HEADERS ON)  # they would compile the kernels of every kind
+set(of_cold_kinds adjoint/packs/cold_kinds.cpp adjoint/blocks/cold_kinds.cpp)
+# Precompiled headers would compile the kernels of every kind into them.
+set_source_files_properties(${tables} ${of_cold_kinds} PROPERTIES SKIP_PRECOMPILE_HEADERS ON SKIP_UNITY_BUILD_INCLUSION ON)
+# For hot kinds alone there is v4: the others take the kernels of v3 (docs/decisions/what-a-build-compiles.md).
+if(NOT variants STREQUAL "portable")
+  sheetbend_add_kernels(v3 cold_packs SOURCES ${cold_packs} OPTIONS -O3 ${inlined_in_part})
+  sheetbend_add_kernels(v3 cold_blocks SOURCES ${of_cold_kinds} ${cold_blocks} OPTIONS -O3)
+endif()
 foreach(variant IN LISTS variants)
   if(variant STREQUAL "v4")
-    # For hot kinds alone: the others take the kernels of v3 (docs/decisions/what-a-build-compiles.md).
     sheetbend_add_kernels(v4 hot SOURCES ${tables} ${hot_packs} ${hot_blocks} OPTIONS -O3 ${inlined_whole} COLD_VARIANT v3)
   elseif(variant STREQUAL "v3")
-    sheetbend_add_kernels(${variant} hot SOURCES ${tables} ${hot_packs} ${hot_blocks} OPTIONS -O3 ${inlined_whole})
-    sheetbend_add_kernels(${variant} cold_packs SOURCES ${cold_packs} OPTIONS -O3 ${inlined_in_part})
-    sheetbend_add_kernels(${variant} cold_blocks SOURCES ${cold_blocks} OPTIONS -O3)
+    sheetbend_add_kernels(v3 hot SOURCES ${tables} ${hot_packs} ${hot_blocks} OPTIONS -O3 ${inlined_whole})
   elseif(has_x86_kernels)
-    # Beside the others these serve processors without AVX2, of which there are few: they are to be small. Alone they serve builds that are to be quick.
+    # Beside the others these serve processors without AVX2, and builds that were made on a machine with a wider set: those of cold kinds are to be small.
+    # Alone they serve builds that are to be quick.
     set(level -Os)
-    if(SHEETBEND_PORTABLE_KERNELS)
+    if(variants STREQUAL "portable")
       set(level -O1)
     endif()
-    sheetbend_add_kernels(${variant} all SOURCES ${tables} ${hot_packs} ${hot_blocks} ${cold_packs} ${cold_blocks} OPTIONS ${level})
+    sheetbend_add_kernels(portable hot SOURCES ${tables} ${hot_packs} ${hot_blocks} OPTIONS -O1)
+    sheetbend_add_kernels(portable cold SOURCES ${cold_packs} ${cold_blocks} OPTIONS ${level})
+    sheetbend_compile_together(sheetbend_kernels_portable_hot 6)
+    sheetbend_compile_together(sheetbend_kernels_portable_cold 6)
   else()
     # On other processors kernels of blocks keep gcc's own limits: what more of inlining brings there was not measured.
-    sheetbend_add_kernels(${variant} packs SOURCES ${hot_packs} OPTIONS -O3 ${inlined_whole})
-    sheetbend_add_kernels(${variant} blocks SOURCES ${tables} ${hot_blocks} ${cold_packs} ${cold_blocks} OPTIONS -O3)
+    sheetbend_add_kernels(portable packs SOURCES ${hot_packs} OPTIONS -O3 ${inlined_whole})
+    sheetbend_add_kernels(portable blocks SOURCES ${tables} ${hot_blocks} ${cold_packs} ${cold_blocks} OPTIONS -O3)
   endif()
 endforeach()

@@ -112,7 +112,8 @@ use_compiler_cache() {
   export CMAKE_CXX_COMPILER_LAUNCHER=ccache CCACHE_BASEDIR="$ROOT" CCACHE_NOHASHDIR=1
 }
 
-# install_sheetbend EXTRAS: builds in place of pip's throw-away directory, so that a second build compiles only what changed.
+# install_sheetbend EXTRAS: builds in place of pip's throw-away directory, so that a second build compiles only what changed. For `dev` the kernels of all
+# instruction sets are compiled, which its tests compare; otherwise those for this machine.
 install_sheetbend() {
   local extras=$1 found
   found=$(fingerprint)
@@ -129,6 +130,7 @@ install_sheetbend() {
   pip install -q "${tools[@]}"
   say "building and installing sheetbend[$extras] (minutes the first time)"
   local settings=(--config-settings build-dir="$ROOT/build/wheel")
+  [[ $extras != dev ]] || settings+=(--config-settings cmake.define.SHEETBEND_KERNELS=all)
   [[ -z ${CI:-} ]] || settings+=(--config-settings cmake.define.SHEETBEND_WERROR=ON)
   pip install -q --no-build-isolation "${settings[@]}" "${ROOT}[$extras]"
   echo "$found $extras" >"$STAMP"

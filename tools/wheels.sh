@@ -32,7 +32,8 @@ else
   say "building, in some seven minutes on two cores"
   rm -rf "$BUILT"
   python3 -m pip wheel . --no-deps --wheel-dir "$BUILT" \
-    --config-settings=cmake.define.SHEETBEND_CERES=OFF --config-settings=cmake.define.SHEETBEND_SYSTEM_EIGEN=OFF
+    --config-settings=cmake.define.SHEETBEND_KERNELS=all --config-settings=cmake.define.SHEETBEND_CERES=OFF \
+    --config-settings=cmake.define.SHEETBEND_SYSTEM_EIGEN=OFF
   wheel=$(ls "$BUILT"/sheetbend-*.whl)
 fi
 

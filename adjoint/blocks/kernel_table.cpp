@@ -5,9 +5,9 @@
 #include "core/blocks/potential.h"
 #include "core/constraints/kernels_by_number.h"
 
-using BlockKinds = const sheetbend_blocks::KindKernels* const*;
 #ifdef SHEETBEND_COLD_VARIANT
-extern "C" BlockKinds SHEETBEND_JOIN(sheetbend_block_kinds_, SHEETBEND_COLD_VARIANT)() noexcept;
+extern "C" const sheetbend::KernelsByNumber<sheetbend_blocks::KindKernels> SHEETBEND_JOIN(sheetbend_cold_blocks_,
+                                                                                          SHEETBEND_COLD_VARIANT);
 #endif
 
 namespace sheetbend {
@@ -16,7 +16,7 @@ namespace {
 using sheetbend_blocks::KindKernels;
 
 #ifdef SHEETBEND_COLD_VARIANT
-std::array<const KindKernels*, kind_count> kinds;  // filled by adjoint/packs/kernel_table.cpp
+KernelsByNumber<KindKernels> kinds;  // filled by adjoint/packs/kernel_table.cpp
 #else
 constinit const auto kinds = kernels_by_number<BlockKernels, KindKernels>();
 #endif
@@ -38,11 +38,7 @@ constexpr sheetbend_blocks::Kernels many{ForwardKernels<Pack, Part<&KindKernels:
 #ifdef SHEETBEND_COLD_VARIANT
 extern "C" void SHEETBEND_JOIN(sheetbend_fill_blocks_, SHEETBEND_VARIANT)() noexcept {
   sheetbend::kinds = sheetbend::kernels_by_number<sheetbend::BlockKernels>(
-      SHEETBEND_JOIN(sheetbend_block_kinds_, SHEETBEND_COLD_VARIANT)());
-}
-#else
-extern "C" BlockKinds SHEETBEND_JOIN(sheetbend_block_kinds_, SHEETBEND_VARIANT)() noexcept {
-  return sheetbend::kinds.data();
+      SHEETBEND_JOIN(sheetbend_cold_blocks_, SHEETBEND_COLD_VARIANT).data());
 }
 #endif
 extern "C" const sheetbend_blocks::Table SHEETBEND_JOIN(sheetbend_blocks_, SHEETBEND_VARIANT){

@@ -12,7 +12,7 @@ extern "C" sheetbend_blocks::FactorUnsymmetric SHEETBEND_JOIN(sheetbend_factor_u
 using sheetbend_packs::KindKernels;
 
 #ifdef SHEETBEND_COLD_VARIANT
-extern "C" const sheetbend_packs::KernelTable* SHEETBEND_JOIN(sheetbend_kernels_, SHEETBEND_COLD_VARIANT)() noexcept;
+extern "C" const sheetbend::KernelsByNumber<KindKernels> SHEETBEND_JOIN(sheetbend_cold_packs_, SHEETBEND_COLD_VARIANT);
 extern "C" void SHEETBEND_JOIN(sheetbend_fill_blocks_, SHEETBEND_VARIANT)() noexcept;
 #endif
 
@@ -20,7 +20,7 @@ namespace {
 
 #ifdef SHEETBEND_COLD_VARIANT
 // Filled when they are asked for: where the machine lacks this instruction set, none of its code may run, not even when the program is loaded.
-std::array<const KindKernels*, sheetbend::kind_count> kinds;
+sheetbend::KernelsByNumber<KindKernels> kinds;
 #else
 constinit const auto kinds = sheetbend::kernels_by_number<sheetbend::PackKernels, KindKernels>();
 #endif
@@ -37,8 +37,8 @@ constexpr sheetbend_packs::KernelTable kernels{SHEETBEND_VARIANT_NAME,
 extern "C" const sheetbend_packs::KernelTable* SHEETBEND_JOIN(sheetbend_kernels_, SHEETBEND_VARIANT)() noexcept {
 #ifdef SHEETBEND_COLD_VARIANT
   static const bool filled = [] {
-    const auto* cold = SHEETBEND_JOIN(sheetbend_kernels_, SHEETBEND_COLD_VARIANT)();
-    kinds = sheetbend::kernels_by_number<sheetbend::PackKernels>(cold->kinds);
+    const auto& cold = SHEETBEND_JOIN(sheetbend_cold_packs_, SHEETBEND_COLD_VARIANT);
+    kinds = sheetbend::kernels_by_number<sheetbend::PackKernels>(cold.data());
     SHEETBEND_JOIN(sheetbend_fill_blocks_, SHEETBEND_VARIANT)();
     return true;
   }();

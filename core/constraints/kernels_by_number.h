@@ -14,8 +14,12 @@
 
 namespace sheetbend {
 
+template <class Kernels>
+using KernelsByNumber = std::array<const Kernels*, kind_count>;
+
+// `of_cold_kinds` are those of kinds that are not hot; null where these have kernels of their own.
 template <template <class> class Own, class Kernels>
-constexpr auto kernels_by_number([[maybe_unused]] const Kernels* const* of_cold_kinds = nullptr) {
+constexpr KernelsByNumber<Kernels> kernels_by_number([[maybe_unused]] const Kernels* const* of_cold_kinds = nullptr) {
   const auto choose = [&of_cold_kinds]<class K>(K*, [[maybe_unused]] std::size_t kind) -> const Kernels* {
 #ifdef SHEETBEND_COLD_VARIANT
     if constexpr (!Own<K>::hot) return of_cold_kinds[kind];
@@ -23,8 +27,22 @@ constexpr auto kernels_by_number([[maybe_unused]] const Kernels* const* of_cold_
     return &Own<K>::all;
   };
   return [&]<class... K, std::size_t... kind>(std::tuple<K...>*, std::index_sequence<kind...>) {
-    return std::array{choose(static_cast<K*>(nullptr), kind)...};
+    return KernelsByNumber<Kernels>{choose(static_cast<K*>(nullptr), kind)...};
   }(static_cast<Registry*>(nullptr), std::make_index_sequence<kind_count>());
+}
+
+// Those of kinds that are not hot, null for the others.
+template <template <class> class Own, class Kernels>
+constexpr KernelsByNumber<Kernels> cold_kernels_by_number() {
+  const auto choose = []<class K>(K*) -> const Kernels* {
+    if constexpr (Own<K>::hot)
+      return nullptr;
+    else
+      return &Own<K>::all;
+  };
+  return [&]<class... K>(std::tuple<K...>*) {
+    return KernelsByNumber<Kernels>{choose(static_cast<K*>(nullptr))...};
+  }(static_cast<Registry*>(nullptr));
 }
 
 }  // namespace sheetbend

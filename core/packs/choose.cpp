@@ -3,13 +3,16 @@
 #include <stdexcept>
 #include <string>
 
+#include "core/packs/instruction_sets.h"
 #include "core/packs/packed_colors.h"
 
 #define SHEETBEND_DECLARE(variant) \
   extern "C" const sheetbend_packs::KernelTable* sheetbend_kernels_##variant() noexcept;
 SHEETBEND_DECLARE(portable)
-#ifdef SHEETBEND_X86_KERNELS
+#ifdef SHEETBEND_KERNELS_V3
 SHEETBEND_DECLARE(v3)
+#endif
+#ifdef SHEETBEND_KERNELS_V4
 SHEETBEND_DECLARE(v4)
 #endif
 
@@ -33,18 +36,25 @@ const sheetbend_packs::KernelTable& choose() {
 
 std::vector<const sheetbend_packs::KernelTable*> available_kernels() {
   std::vector<const sheetbend_packs::KernelTable*> available;
-#ifdef SHEETBEND_X86_KERNELS
-  __builtin_cpu_init();
-  const bool v3 = __builtin_cpu_supports("popcnt") && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi") &&
-                  __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("fma");
-  const bool v4 = v3 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-                  __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&
-                  __builtin_cpu_supports("avx512vl");
-  if (v4) available.push_back(sheetbend_kernels_v4());
-  if (v3) available.push_back(sheetbend_kernels_v3());
+#ifdef SHEETBEND_KERNELS_V4
+  if (runs_v4()) available.push_back(sheetbend_kernels_v4());
+#endif
+#ifdef SHEETBEND_KERNELS_V3
+  if (runs_v3()) available.push_back(sheetbend_kernels_v3());
 #endif
   available.push_back(sheetbend_kernels_portable());
   return available;
+}
+
+std::vector<const char*> compiled_instruction_sets() {
+  return {
+#ifdef SHEETBEND_KERNELS_V4
+      "x86-64-v4",
+#endif
+#ifdef SHEETBEND_KERNELS_V3
+      "x86-64-v3",
+#endif
+      "portable"};
 }
 
 const sheetbend_packs::KernelTable& pack_kernels() {

@@ -6,8 +6,10 @@
 
 #define SHEETBEND_DECLARE(variant) extern "C" const sheetbend_contacts::Table sheetbend_contacts_##variant;
 SHEETBEND_DECLARE(portable)
-#ifdef SHEETBEND_X86_KERNELS
+#ifdef SHEETBEND_KERNELS_V3
 SHEETBEND_DECLARE(v3)
+#endif
+#ifdef SHEETBEND_KERNELS_V4
 SHEETBEND_DECLARE(v4)
 #endif
 
@@ -63,8 +65,11 @@ sheetbend_contacts::Pass PackedContacts::pass(int iteration, const sheetbend_con
 
 const sheetbend_contacts::Table& contact_kernels_of(std::string_view instruction_set) {
   static constexpr const sheetbend_contacts::Table* tables[] = {
-#ifdef SHEETBEND_X86_KERNELS
-      &sheetbend_contacts_v4, &sheetbend_contacts_v3,
+#ifdef SHEETBEND_KERNELS_V4
+      &sheetbend_contacts_v4,
+#endif
+#ifdef SHEETBEND_KERNELS_V3
+      &sheetbend_contacts_v3,
 #endif
       &sheetbend_contacts_portable};
   for (const auto* table : tables)

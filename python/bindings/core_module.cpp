@@ -3,6 +3,7 @@
 
 #include "adjoint/equilibrium/equilibrium_tangents.h"
 #include "adjoint/tape/tape_plan.h"
+#include "core/packs/instruction_sets.h"
 #include "core/rollout/rollout.h"
 #include "python/bindings/interrupt.h"
 
@@ -13,6 +14,7 @@ PYBIND11_MODULE(_core, m) {
       "Compiled core of sheetbend. Use the package's Python functions; this module's shapes are flat and unchecked "
       "beyond sizes.";
   m.def("instruction_set", [] { return pack_kernels().name; });
+  m.def("compiled_instruction_sets", &compiled_instruction_sets);
   static py::exception<Diverged> diverged(m, "Diverged", PyExc_RuntimeError);
   static py::exception<Unconverged> unconverged(m, "Unconverged", PyExc_RuntimeError);
   static py::exception<Unbalanced> unbalanced(m, "Unbalanced", unconverged);

@@ -204,19 +204,63 @@ py::capsule evaluation_of(int rows, int parameters, py::function function, bool 
       });
 }
 
+// What f(&interrupt) returns; it runs without the GIL and ends at a signal.
+template <class F>
+auto run_freely(F&& f) {
+  py::gil_scoped_release release;
+  SignalInterrupt interrupt;
+  return f(&interrupt);
+}
+
+// As an array (size / columns, columns).
+py::array_t<double> in_columns(const std::vector<double>& numbers, int columns) {
+  return to_numpy(numbers, {static_cast<py::ssize_t>(numbers.size()) / columns, columns});
+}
+py::array_t<double> in_a_row(const std::vector<double>& numbers) {
+  return to_numpy(numbers, {static_cast<py::ssize_t>(numbers.size())});
+}
+
 // (ok, residual, jacobian or None)
 py::tuple evaluate(const Problem& p, const Array& u, bool with_jacobian) {
   expect_size(u, p.parameters(), "u");
   const auto rows = static_cast<py::ssize_t>(p.rows()), columns = static_cast<py::ssize_t>(p.parameters());
   py::array_t<double> residual(rows), jacobian({with_jacobian ? rows : 0, columns});
   double *r = residual.mutable_data(), *J = with_jacobian ? jacobian.mutable_data() : nullptr;
-  bool ok;
-  {
-    py::gil_scoped_release release;
-    SignalInterrupt interrupt;
-    ok = p.evaluate(u.data(), r, J, &interrupt);
-  }
+  const bool ok = run_freely([&](Interrupt* interrupt) { return p.evaluate(u.data(), r, J, interrupt); });
   return py::make_tuple(ok, residual, jacobian);
+}
+
+py::array_t<double> physical(const Problem& p, const Array& u) {
+  expect_size(u, p.parameters(), "u");
+  return in_a_row(p.physical(u.data()));
+}
+
+// Markers of an experiment, (frames times markers, 3).
+py::array_t<double> markers_of(const Problem& p, int experiment, const Array& u) {
+  expect_size(u, p.parameters(), "u");
+  return in_columns(run_freely([&](Interrupt* interrupt) { return p.simulate(experiment, u.data(), interrupt); }), 3);
+}
+
+// Forces and torques of its sensors, (frames times sensors, 6).
+py::array_t<double> readings_of(const Problem& p, int experiment, const Array& u) {
+  expect_size(u, p.parameters(), "u");
+  return in_columns(run_freely([&](Interrupt* interrupt) { return p.readings(experiment, u.data(), interrupt); }), 6);
+}
+
+// (changes, numbers of the markers)
+py::array_t<double> respond(const Problem& p, int experiment, const Array& u, const Array& changes) {
+  expect_size(u, p.parameters(), "u");
+  const std::size_t numbers = p.correction(experiment).size();
+  const auto count = numbers == 0 ? 0 : static_cast<int>(changes.size() / numbers);
+  expect_size(changes, count * numbers, "changes");
+  const auto moved = run_freely(
+      [&](Interrupt* interrupt) { return p.respond(experiment, u.data(), changes.data(), count, interrupt); });
+  return to_numpy(moved, {count, static_cast<py::ssize_t>(moved.size()) / std::max(count, 1)});
+}
+
+py::array_t<double> reduced(const Problem& p, const Array& change) {
+  expect_size(change, p.data_rows(), "change");
+  return in_a_row(p.reduced(change.data()));
 }
 
 }  // namespace
@@ -231,67 +275,16 @@ void bind_problem(py::module_& m) {
       .def_property_readonly("parameters", &Problem::parameters)
       .def_property_readonly("failure", &Problem::failure)
       .def("evaluate", &evaluate, py::arg("u"), py::arg("jacobian") = true)
-      .def("physical",
-           [](const Problem& p, const Array& u) {
-             expect_size(u, p.parameters(), "u");
-             const auto theta = p.physical(u.data());
-             return to_numpy(theta, {static_cast<py::ssize_t>(theta.size())});
-           })
-      .def("simulate",
-           [](const Problem& p, int experiment, const Array& u) {
-             expect_size(u, p.parameters(), "u");
-             std::vector<double> markers;
-             {
-               py::gil_scoped_release release;
-               SignalInterrupt interrupt;
-               markers = p.simulate(experiment, u.data(), &interrupt);
-             }
-             return to_numpy(markers, {static_cast<py::ssize_t>(markers.size() / 3), 3});
-           })
-      .def("readings",
-           [](const Problem& p, int experiment, const Array& u) {
-             expect_size(u, p.parameters(), "u");
-             std::vector<double> read;
-             {
-               py::gil_scoped_release release;
-               SignalInterrupt interrupt;
-               read = p.readings(experiment, u.data(), &interrupt);
-             }
-             return to_numpy(read, {static_cast<py::ssize_t>(read.size() / 6), 6});
-           })
-      .def("respond",
-           [](const Problem& p, int experiment, const Array& u, const Array& changes) {
-             expect_size(u, p.parameters(), "u");
-             const std::size_t numbers = p.correction(experiment).size();
-             const auto count = numbers == 0 ? 0 : static_cast<int>(changes.size() / numbers);
-             expect_size(changes, count * numbers, "changes");
-             std::vector<double> moved;
-             {
-               py::gil_scoped_release release;
-               SignalInterrupt interrupt;
-               moved = p.respond(experiment, u.data(), changes.data(), count, &interrupt);
-             }
-             return to_numpy(moved, {count, static_cast<py::ssize_t>(moved.size()) / std::max(count, 1)});
-           })
-      .def("reduced",
-           [](const Problem& p, const Array& change) {
-             expect_size(change, p.data_rows(), "change");
-             const std::vector<double> made = p.reduced(change.data());
-             return to_numpy(made, {static_cast<py::ssize_t>(made.size())});
-           })
-      .def("correction",
-           [](const Problem& p, int experiment) {
-             const std::vector<double>& b = p.correction(experiment);
-             return to_numpy(b, {static_cast<py::ssize_t>(b.size())});
-           })
+      .def("physical", &physical)
+      .def("simulate", &markers_of)
+      .def("readings", &readings_of)
+      .def("respond", &respond)
+      .def("reduced", &reduced)
+      .def("correction", [](const Problem& p, int experiment) { return in_a_row(p.correction(experiment)); })
       .def("absorbed", &Problem::absorbed)
       .def("relinearize", &Problem::relinearize)
       .def("follow", &Problem::follow, py::arg("other"))
-      .def("state",
-           [](const Problem& p) {
-             const std::vector<double> state = p.state();
-             return to_numpy(state, {static_cast<py::ssize_t>(state.size())});
-           })
+      .def("state", [](const Problem& p) { return in_a_row(p.state()); })
       .def("restore",
            [](const Problem& p, const Array& state) { p.restore({state.data(), state.data() + state.size()}); })
       .def("evaluation", &evaluation);

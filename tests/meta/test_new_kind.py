@@ -57,7 +57,7 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     before = "// The kinds that a test of every kind goes through."
     cases.write_text(cases.read_text().replace(before, (TOY / "row_of_cases.h").read_text() + "\n" + before))
 
-    options = ["-DSHEETBEND_TESTS=ON", "-DSHEETBEND_PORTABLE_KERNELS=ON", f"-DPython_EXECUTABLE={sys.executable}"]
+    options = ["-DSHEETBEND_TESTS=ON", "-DSHEETBEND_KERNELS=portable", f"-DPython_EXECUTABLE={sys.executable}"]
     done = subprocess.run(
         ["cmake", "-G", "Ninja", "-S", str(copy), "-B", str(copy / "build"), *options], capture_output=True, text=True
     )

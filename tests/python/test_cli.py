@@ -346,6 +346,8 @@ class TestInfo:
         found = last_line(run("info", "--json"))
         assert found["sheetbend"] == sb.__version__ and isinstance(found["ceres"], bool)
         assert found["constraints"]["distance"] == 2 and set(found["constraints"]) == set(sb.KINDS)
+        kernels = found["kernels"]
+        assert kernels["used"] in kernels["compiled"] and kernels["compiled"][-1] == "portable"
 
     def test_configuration(self, config: Path) -> None:
         found = last_line(run("info", config, "--json"))["config"]

@@ -12,6 +12,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from .. import _core
 from ..config import GrippedConfig, build, parse_any, scene_alone
 from ..doubts.implausible import other_than_meant
 from ..errors import ConfigError
@@ -62,12 +63,14 @@ def _without_ceres() -> str:
 
 def _info(console: Console, path: Path | None) -> Outcome:
     data: dict[str, Any] = {"sheetbend": __version__, "python": platform.python_version(), "packages": _packages()}
+    data["kernels"] = {"used": _core.instruction_set(), "compiled": _core.compiled_instruction_sets()}
     data |= {"ceres": has_ceres(), "constraints": {name: kind["arity"] for name, kind in KINDS.items()}}
     heading(console, f"sheetbend {__version__}", f"Python {data['python']}, {platform.machine()}")
     console.print(
         "  optimizers   ",
         "ceres, scipy" if has_ceres() else f"scipy ({_without_ceres()})",
     )
+    console.print("  kernels      ", f"{data['kernels']['used']} (compiled: {', '.join(data['kernels']['compiled'])})")
     console.print(
         "  constraints  ", ", ".join(f"{name} ({arity})" for name, arity in data["constraints"].items()), soft_wrap=True
     )
