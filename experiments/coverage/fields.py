@@ -4,6 +4,7 @@ modes and the motion: of 392 triangles of a cloth, or of 20 joints of a rope.
     python experiments/coverage/fields.py draw short --seeds 0 20   # one JSON line per seed; known ones are skipped
     python experiments/coverage/fields.py table
     python experiments/coverage/fields.py figure short 0            # one draw as a map: what is left beside the error
+    python experiments/coverage/fields.py known long --seeds 0 6    # what a draw itself tells of its prior
 
 A square cloth of 14 x 14 cells is let go at the level of its pins, or a rope of 20 links that is clamped at one end.
 ln E is drawn from the prior with all modes that the mesh has; the fit has some of them, and finds the size and the
@@ -24,10 +25,14 @@ from coverage import OUT, lines
 from scipy.stats import binomtest
 from sheetbend.cli.cloth_figures import stiffness_panels
 from sheetbend.minimum.counts import counted
+from sheetbend.minimum.field_priors import Picture
+from sheetbend.minimum.smooth import Field
+from sheetbend.objects.stiffness_field import StiffnessField
 
 SIDE, CELLS, WARP, EI, JOINTS = 0.3, 14, 20.0, 1e-3, 20
 SIZE, LENGTH = 0.3, 0.1  # of the prior that fields are drawn from
 AFTER_NEWTON = {"refine": False, "profiles": False}
+EXACT = 1e-6  # error of a mode that counts as known
 
 
 @dataclass(frozen=True)
@@ -84,12 +89,17 @@ def hung(motion: Motion, modes: int) -> sb.Scene:
     return sb.cloth(mesh, pinned=motion.pinned, stiffness_modes=modes, **given)
 
 
+def drawn(motion: Motion, rng: np.random.Generator) -> tuple[sb.Scene, StiffnessField, np.ndarray]:
+    """The scene with all modes of its mesh, its field, and the modes drawn from the prior."""
+    scene = hung(motion, motion.every)
+    field = scene.ropes["rope"].field if motion.is_rope else scene.cloths["cloth"].field
+    return scene, field, field.deviations(SIZE, LENGTH) * rng.standard_normal(motion.every)
+
+
 def fitted(motion: Motion, seed: int) -> tuple[sb.Fit, np.ndarray]:
     """A fit to a field drawn from the prior, and the true ln E (triangles,)."""
     rng = np.random.default_rng(seed)
-    scene = hung(motion, motion.every)
-    field = scene.ropes["rope"].field if motion.is_rope else scene.cloths["cloth"].field
-    q = field.deviations(SIZE, LENGTH) * rng.standard_normal(motion.every)
+    scene, field, q = drawn(motion, rng)
     times = np.arange(motion.frames) / (60 if motion.is_rope else 50)
     solver = sb.Solver(h=1 / 600) if motion.is_rope else sb.Solver(h=0.01, method="newton")
     x = sb.simulate(scene, times, solver, values=dict(zip(field.modes, q, strict=True))).positions
@@ -166,6 +176,20 @@ def table(folder: Path) -> None:
         )
 
 
+def known(name: str, seeds: range) -> None:
+    """The likeliest size and length of the prior of every draw, and their intervals, where all modes are known."""
+    for seed in seeds:
+        _, field, q = drawn(MOTIONS[name], np.random.default_rng(seed))
+        exact = np.column_stack([np.eye(len(q)) / EXACT, np.zeros(len(q))])
+        picture = Picture(exact, (np.arange(len(q)),), q)
+        found = picture.bounded((picture.likeliest((Field(field, sb.Smooth(), SIZE, LENGTH),), 0),), 0)
+        told = [
+            f"{value:.3f} {ends}" for value, ends in ((found.size, found.size_ends), (found.length, found.length_ends))
+        ]
+        rms = np.sqrt(np.mean((field.shapes @ q) ** 2))
+        print(f"draw {seed}: rms {rms:.3f}, size {told[0]}, length {told[1]}", flush=True)
+
+
 def figure(name: str, seed: int, file: Path) -> None:
     """The map of one draw: what is left of the prior, and the true error."""
     found, lnE = fitted(MOTIONS[name], seed)
@@ -197,7 +221,7 @@ def _over(moves: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["draw", "table", "figure"])
+    parser.add_argument("what", choices=["draw", "table", "figure", "known"])
     parser.add_argument("motion", nargs="?", choices=list(MOTIONS), default="short")
     parser.add_argument("seed", nargs="?", type=int, default=0)
     parser.add_argument("--seeds", nargs=2, type=int, default=(0, 20), metavar=("FIRST", "STOP"))
@@ -205,6 +229,8 @@ def main() -> None:
     given = parser.parse_args()
     if given.what == "table":
         table(given.out)
+    elif given.what == "known":
+        known(given.motion, range(*given.seeds))
     elif given.what == "figure":
         given.out.mkdir(parents=True, exist_ok=True)
         figure(given.motion, given.seed, given.out / f"field_{given.motion}_{given.seed}.png")

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from scipy import stats
+from scipy import optimize, stats
 from sheetbend.minimum.field_fits import half_widths, spread
-from sheetbend.minimum.smooth import LENGTHS, SIZES, Field, Picture, Smooth
+from sheetbend.minimum.field_priors import LENGTHS, SIZES, Picture
+from sheetbend.minimum.smooth import Field, Smooth
 from sheetbend.objects.stiffness_field import StiffnessField, modes_of
 
 N = 5
@@ -68,6 +69,40 @@ def test_a_prior_that_is_given_is_exact() -> None:
     prior = np.sum((about / weight[:2]) ** 2, axis=1)
     assert left == pytest.approx(np.diag(about @ covariance[:2, :2] @ about.T) / prior)
     assert of_modes == pytest.approx(np.diag(covariance)[:2] * weight[:2] ** 2)
+
+
+def test_intervals_of_size_and_length_are_those_of_exact_profiles() -> None:
+    """Of 40 known modes: the best size at a length has a closed form, and a larger size goes with a longer length."""
+    n, truth = 41, (0.3, 0.03)
+    centers = np.column_stack([0.01 * np.arange(n), np.zeros((n, 2))])
+    values, shapes = modes_of(centers, np.column_stack([np.arange(n - 1), np.arange(1, n)]))
+    modes = StiffnessField("E", tuple(f"E_{k}" for k in range(1, n)), values, shapes[:, 1:], centers, np.zeros((n, 0)))
+    q = modes.deviations(*truth) * np.random.default_rng(4).standard_normal(n - 1)
+    picture = Picture(np.column_stack([np.eye(n - 1) / 1e-7, np.zeros(n - 1)]), (np.arange(n - 1),), q)
+    found = picture.bounded([picture.likeliest([Field(modes, Smooth(), *truth)], 0)], 0)
+
+    def height(size: float, length: float) -> float:
+        d = modes.deviations(size, length)
+        return float(np.sum(np.log(d**2) + (q / d) ** 2))
+
+    def over_sizes(length: float) -> float:
+        return height(math.sqrt(np.mean((q / modes.deviations(1.0, length)) ** 2)), length)
+
+    def over_lengths(size: float) -> float:
+        return float(optimize.minimize_scalar(lambda t: height(size, math.exp(t)), bounds=(-5.0, 2.0)).fun)
+
+    best = optimize.minimize_scalar(lambda t: over_sizes(math.exp(t)), bounds=(-5.0, 2.0))
+    for value, ends, profile in (
+        (found.size, found.size_ends, over_lengths),
+        (found.length, found.length_ends, over_sizes),
+    ):
+        for end, sign in zip(ends, (-1.0, 1.0), strict=True):
+            exact = optimize.brentq(
+                lambda t, profile=profile: profile(math.exp(t)) - best.fun - 3.841,
+                math.log(value),
+                math.log(value) + 2 * sign,
+            )
+            assert end is not None and abs(math.log(end) - exact) < 0.03 * abs(math.log(value) - exact), (end, exact)
 
 
 def test_a_prior_that_was_found_is_integrated_out() -> None:

@@ -21,12 +21,13 @@ from ..experiment.wanted import ParameterLike, as_parameters
 from ..minimum.by_ceres import ceres_trouble
 from ..minimum.continuity import joined
 from ..minimum.discretization import Refinement, wanted_refinement
+from ..minimum.field_priors import settled
 from ..minimum.journal import journaled
 from ..minimum.linear_algebra import one_blas_thread
 from ..minimum.problem import FitProblem
 from ..minimum.progress import Observer
 from ..minimum.search import Search
-from ..minimum.smooth import Smooth, settled, with_fields
+from ..minimum.smooth import Smooth, with_fields
 from ..minimum.workers import shared_out
 from ..optional import require
 from ..quantities.parameters import Parameter, Parameters

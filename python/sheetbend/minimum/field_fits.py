@@ -18,8 +18,9 @@ from ..objects.over_time import OverTime
 from ..objects.stiffness_field import StiffnessField
 from ..result.field import FieldFit
 from ..result.over_time import OverTimeFit
+from .field_priors import Picture
 from .problem import FitProblem
-from .smooth import Field, Modes, Picture
+from .smooth import Field, Modes
 
 LEVEL = 0.95
 HALVINGS = 40  # of the range of half-widths
