@@ -16,6 +16,7 @@ from sheetbend.errors import InputError
 from sheetbend.gripped import fit_rope
 from sheetbend.minimum import linear_algebra
 from sheetbend.minimum.linear_algebra import one_blas_thread
+from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.workers import Common, working_on
 from sheetbend.textile import Curve, fit_fabric, fit_pull, fit_tests
 from test_journal import swinging
@@ -41,7 +42,7 @@ def _two_threads() -> Iterator[None]:
 def seen(monkeypatch: pytest.MonkeyPatch) -> list[set[int]]:
     """The numbers of threads when a problem checks its start."""
     found: list[set[int]] = []
-    problem = sb.minimum.problem.FitProblem
+    problem = FitProblem
     evaluated: Callable[..., Any] = problem.check_start
 
     def watched(self: Any) -> Any:

@@ -14,11 +14,13 @@ from typing import Any
 import numpy as np
 import pytest
 import sheetbend as sb
+from sheetbend.page import show_in_notebooks
 
 pytest.importorskip("jinja2")
 ROOT = Path(__file__).resolve().parents[2]
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 SOLVER = sb.Solver(h=1 / 200)
+show_in_notebooks()
 
 
 def shown(thing: Any) -> dict[str, Any]:

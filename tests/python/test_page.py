@@ -19,7 +19,7 @@ import pytest
 import sheetbend as sb
 from sheetbend.cli.app import app
 from sheetbend.mesh import grid
-from sheetbend.objects.arm import add_pendulum
+from sheetbend.objects.arm import add_arm, add_pendulum
 from sheetbend.page import Shown, fit_page, motion_page, of_recording, of_trajectory
 from sheetbend.page.packed import MISSING, packed_motions
 from sheetbend.page.render import table
@@ -171,6 +171,25 @@ class TestMotionPage:
         shown = of_trajectory(scene, sb.simulate(scene, [0.0, 0.01], sb.Solver(h=1 / 200)))
         (motion,) = data_of(motion_page([shown], "pendulum"))["motions"]
         assert [line["kind"] for line in motion["lines"]] == ["link"]
+
+    def test_an_arm_is_a_line_from_its_pivot_to_its_end(self) -> None:
+        """Two arms were drawn as the two rhombi of the distances that keep them rigid."""
+        scene = sb.Scene()
+        upper = add_arm(scene, "upper", mass=1.0, first_moment=0.1, inertia=0.02, length=0.3, angle=1.0)
+        add_arm(scene, "lower", mass=1.0, first_moment=0.1, inertia=0.02, length=0.3, pivot=upper)
+        shown = of_trajectory(scene, sb.simulate(scene, [0.0, 0.01], sb.Solver(h=1 / 200)))
+        (motion,) = packed_motions([shown])
+        assert [line["nodes"] for line in motion["lines"]] == [2, 2] and motion["masses"] is None
+        np.testing.assert_array_equal(*(list(shown.lines.values())[k][:, 1 - k] for k in (0, 1)))  # they share a hinge
+
+    def test_masses_on_particles_are_drawn(self) -> None:
+        """The weight at the end of a rope was missing."""
+        scene = sb.rope(0.3, 6, density=0.05, EI=1e-3, direction=(0, 0, -1), pinned=(0,))
+        scene.add_point_mass(6, 0.02, "weight")
+        motion = sb.simulate(scene, [0.0, 0.05], sb.Solver(h=1 / 200))
+        (packed,) = packed_motions([of_trajectory(scene, motion)])
+        found = places_of(packed, packed["masses"])[:, 0]
+        assert np.abs(found - motion.positions[:, 6]).max() <= 0.51 * packed["scale"]
 
     def test_a_cloth_has_its_strain(self) -> None:
         scene = sb.Scene()

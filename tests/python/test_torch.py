@@ -13,6 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -717,3 +718,41 @@ def test_forces_at_a_support_have_the_gradients_of_differences(scene):
             moved.append(float((weights * read(*at_k)).sum()))
         slope = (8 * (moved[1] - moved[2]) - (moved[0] - moved[3])) / (12 * step)
         assert float(value.grad) == pytest.approx(slope, rel=1e-8)
+
+
+class Compiled:
+    """What torch.compile hands over, piece by piece; each runs as it is."""
+
+    def __init__(self) -> None:
+        self.pieces: list[str] = []
+
+    def __call__(self, module: torch.fx.GraphModule, _: list[torch.Tensor]) -> Callable[..., Any]:
+        self.pieces.append(module.code)
+        return module.forward
+
+
+def test_compiled_functions_call_simulations_as_they_are() -> None:
+    scene = sb.rope(0.5, 4, density=0.05, EI=1e-3, clamp_start=(1, 0, 0))
+    scene.add_force([4], np.zeros((1, 1, 3)))
+    stepper = st.Stepper(scene, SOLVER)
+
+    def loss(log_EI: torch.Tensor) -> torch.Tensor:
+        values = {"rope_EI": log_EI.exp()}
+        x = st.simulate(scene, [0.05], SOLVER, values).square().sum()
+        rest = st.equilibrium(scene, values=values).positions.cos().sum()
+        inputs = stepper.inputs(values)
+        state = stepper.start(inputs)
+        for _ in range(2):
+            state = stepper(state, inputs, force=-0.1 * state.velocities[4:])
+        return x + rest + state.positions.square().sum()
+
+    found = []
+    pieces = Compiled()
+    for function in (loss, torch.compile(loss, backend=pieces)):
+        log_EI = torch.tensor(-7.0, dtype=torch.float64, requires_grad=True)
+        value = function(log_EI)
+        value.backward()
+        found.append((value.item(), log_EI.grad.item()))
+    assert found[0] == found[1]
+    code = "".join(pieces.pieces)
+    assert len(pieces.pieces) <= 8 and all(f".{name}(" in code for name in ("exp", "square", "cos"))

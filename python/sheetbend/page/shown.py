@@ -12,7 +12,7 @@ from ..fitting.fit import Fit
 from ..fitting.fitted_motion import fitted_positions
 from ..mesh import TriangleMesh
 from ..motion.simulate import Trajectory
-from ..pictures.body_lines import body_lines
+from ..pictures.body_lines import body_lines, point_masses
 from ..pictures.collider_lines import collider_lines
 from ..pictures.strain import largest_strain
 from ..recording.cloud import Cloud
@@ -46,6 +46,7 @@ class Shown:
         ticks: short lines by name, (frames, lines, 2, 3) m: "twist" of rods, from an edge's middle along its director,
             and the outlines of colliders.
         sheets: cloths and surfaces of solids by name.
+        masses: (frames, n, 3) m, particles that carry a mass of their own; None without.
         markers: names of the measured markers.
         is_cloud: whether they are points of a cloud, other ones in every frame.
         measured, simulated, baseline: (frames, markers, 3) m, NaN where there is nothing; None without.
@@ -59,6 +60,7 @@ class Shown:
     line_kind: str = "rope"
     ticks: Mapping[str, Array] = field(default_factory=dict)
     sheets: Mapping[str, Sheet] = field(default_factory=dict)
+    masses: Array | None = None
     markers: tuple[str, ...] = ()
     is_cloud: bool = False
     measured: Array | None = None
@@ -72,7 +74,7 @@ class Shown:
         """Everything that has a place, (frames, n, 3) each."""
         parts = [*self.lines.values(), *(sheet.positions for sheet in self.sheets.values())]
         parts += [t.reshape(len(t), -1, 3) for t in self.ticks.values()]
-        return parts + [x for x in (self.measured, self.simulated, self.baseline) if x is not None]
+        return parts + [x for x in (self.masses, self.measured, self.simulated, self.baseline) if x is not None]
 
 
 def fitted_motion(found: Fit, c: Comparison) -> Shown:
@@ -132,8 +134,9 @@ def _shown(name: str, scene: Scene, times: Array, positions: Array, recorded: Ma
         lines = _links(scene, positions)
     kind = "rope" if scene.ropes else "link"
     ticks = _ticks(scene, positions) | collider_lines(scene, times, positions) | boxes
-    up = _unit(-scene.gravity)
-    return Shown(name, times, lines, kind, ticks, sheets, up=up, **recorded)  # type: ignore[arg-type]
+    heavy, up = point_masses(scene), _unit(-scene.gravity)
+    masses = positions[:, heavy] if len(heavy) else None
+    return Shown(name, times, lines, kind, ticks, sheets, masses, up=up, **recorded)  # type: ignore[arg-type]
 
 
 def _sheet(mesh: TriangleMesh, positions: Array, kind: str) -> Sheet:
@@ -141,8 +144,11 @@ def _sheet(mesh: TriangleMesh, positions: Array, kind: str) -> Sheet:
 
 
 def _links(scene: Scene, positions: Array) -> dict[str, Array]:
-    """Constraints between two particles as lines of their own."""
-    pairs = [pair for group in scene.groups for pair in group.particles.tolist() if len(pair) == 2]
+    """Constraints between two particles as lines of their own; of an arm that from its pivot to its end."""
+    pairs = []
+    for group in scene.groups:
+        is_arm = f"{group.name.removesuffix('_links')}_first_moment" in scene.quantities
+        pairs += [pair for pair in group.particles.tolist()[: 1 if is_arm else None] if len(pair) == 2]
     points = [pair for pair in pairs if not set(pair) & set(scene.directors)]
     return {f"link {a}-{b}": positions[:, [a, b]] for a, b in points}
 

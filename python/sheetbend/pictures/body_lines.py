@@ -1,4 +1,4 @@
-"""Rigid bodies as boxes, for movies and pages."""
+"""Rigid bodies as boxes, and the particles that carry a mass of their own, for movies and pages."""
 
 from __future__ import annotations
 
@@ -34,3 +34,15 @@ def body_lines(scene: Scene, positions: Array) -> dict[str, Array]:
         lines = [corners[:, pair] for pair in EDGES]
         found[body.name] = np.stack([*lines, np.stack([center, origin], axis=1)], axis=1)
     return found
+
+
+def point_masses(scene: Scene) -> Array:
+    """The particles that carry a mass with a name: those of `add_point_mass`, and the bobs of pendulums."""
+    found = set()
+    for t in scene.terms:
+        if t.array == "mass" and np.ndim(t.index) == 0 and t.index >= 0 and len(t.factors) == 1 and not t.exponents:
+            ((name, function),) = t.factors
+            is_arm = f"{name.removesuffix('_mass')}_first_moment" in scene.quantities
+            if name.endswith("_mass") and function == "identity" and t.coefficient == 1.0 and not is_arm:
+                found.add(int(t.index))
+    return np.array(sorted(found), dtype=int)

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..files.whole import written
 from ..optional import require
 from ..scene.scene import Scene
-from .body_lines import body_lines
+from .body_lines import body_lines, point_masses
 from .collider_lines import collider_lines
 from .drawing import ACCENT, GRAY, INK, WARM, key, new_figure, seen_points
 from .field_plot import box_in_space, field_colors
@@ -140,6 +140,8 @@ def _picture(motion: Motion, shown: Array, title: str) -> tuple[Figure, Any]:
         for lines in (*collider_lines(motion.scene, motion.times, motion.positions).values(), *boxes.values())
     ]
     ropes = [(r.particles, panel.plot([], [], [], color=ACCENT, linewidth=1.8)[0]) for r in motion.scene.ropes.values()]
+    heavy = point_masses(motion.scene)
+    weights = panel.plot([], [], [], "o", color=INK, markersize=8, markeredgewidth=0, zorder=2)[0]
     dots = panel.plot([], [], [], "o", color=WARM, markersize=3.2, markeredgewidth=0, zorder=10)[0]
     off = panel.add_collection3d(art.Line3DCollection(np.zeros((1, 2, 3)), colors=INK, linewidth=1.2, zorder=9))
     drawn_particles = np.concatenate(
@@ -160,6 +162,7 @@ def _picture(motion: Motion, shown: Array, title: str) -> tuple[Figure, Any]:
             drawn.set_array(strains[cloth.name][frame])
         for lines, outline in solids:
             outline.set_segments(lines[frame])
+        weights.set_data_3d(*motion.positions[frame, heavy].T)
         for particles, line in ropes:
             line.set_data_3d(*motion.positions[frame, particles].T)
         if motion.measured is not None:

@@ -15,6 +15,7 @@ from ..motion.core_terms import forces_by_group, pressures_by_volume
 from ..motion.equilibrium import whole_start
 from ..scene.given import check_scene
 from ..scene.scene import Scene
+from .compiled import not_traced
 from .function import respond
 from .inputs import InputMap, dtype_of
 
@@ -84,6 +85,7 @@ class Equilibria:
         return solutions
 
 
+@not_traced
 def equilibrium(
     scene: Scene,
     start: ArrayLike | None = None,

@@ -16,9 +16,11 @@ from ..experiment.force_readings import read_at, readings_problem
 from ..motion.core_terms import divergence
 from ..motion.solver import Solver
 from ..scene.scene import Scene
+from .compiled import not_traced
 from .inputs import dtype_of, given_by_name
 
 
+@not_traced
 def forces(
     scene: Scene,
     times: ArrayLike,

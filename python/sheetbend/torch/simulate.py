@@ -16,6 +16,7 @@ from ..motion.rollouts import Rollouts
 from ..motion.solver import Solver
 from ..scene.given import check_scene
 from ..scene.scene import Scene
+from .compiled import not_traced
 from .function import respond
 from .inputs import InputMap, dtype_of
 
@@ -31,6 +32,7 @@ class Simulation:
         self._inputs = InputMap(scene)
         self._core = self.solver.core(scene.compiled)
 
+    @not_traced
     def __call__(
         self,
         values: Mapping[str, Tensor | float] | None = None,
@@ -46,6 +48,7 @@ class Simulation:
         return states.reshape(*batch, len(self._steps), -1, 3)[..., : self._shown, :]
 
 
+@not_traced
 def simulate(
     scene: Scene,
     times: ArrayLike,

@@ -16,6 +16,7 @@ from ..motion.rollouts import Rollouts
 from ..motion.solver import Solver
 from ..scene.given import check_scene
 from ..scene.scene import Scene
+from .compiled import not_traced
 from .function import respond
 from .inputs import NEEDS, InputMap, broadcast
 from .state import State
@@ -80,6 +81,7 @@ class Stepper:
     def __deepcopy__(self, memo: Any) -> Stepper:
         return Stepper(self.scene, self.solver, dtype=self.dtype)
 
+    @not_traced
     def inputs(
         self, values: Mapping[str, Tensor | float] | None = None, inputs: Mapping[str, Tensor] | None = None
     ) -> Tensor:
@@ -98,6 +100,7 @@ class Stepper:
         wide = {name: v.double() if isinstance(v, Tensor) else v for name, v in (values or {}).items()}
         return self._map(wide, {name: array.double() for name, array in (inputs or {}).items()})
 
+    @not_traced
     def start(self, inputs: Tensor | None = None) -> State:
         """The scene's initial state, at substep 0.
 
@@ -114,6 +117,7 @@ class Stepper:
         v = flat[..., offset : offset + size]
         return self._state(torch.cat([x, x, v, v, x.new_zeros(*x.shape[:-1], 2)], -1))
 
+    @not_traced
     def __call__(self, state: State, inputs: Tensor | None = None, **given: Tensor) -> State:
         """The state a substep later.
 

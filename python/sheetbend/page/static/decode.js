@@ -20,6 +20,7 @@ function decoded(motion) {
   return {
     ...motion,
     extent: 65534 * motion.scale,
+    masses: places(motion, motion.masses),
     measured: places(motion, motion.measured),
     simulated: places(motion, motion.simulated),
     baseline: places(motion, motion.baseline),

@@ -39,6 +39,7 @@ class Space {
     for (const line of motion.lines) this.layers.push(this.line(line, 0.0035 * size));
     for (const tick of motion.ticks) this.layers.push(this.ticks(tick));
     const n = motion.markers.length;
+    if (motion.masses) this.layers.push(this.dots("mass", motion.masses, motion.masses.length / 3 / motion.frames, "ink", 0.016 * size));
     if (motion.measured) this.layers.push(this.dots("measured", motion.measured, n, "gray", 0.0085 * size));
     if (motion.simulated) this.layers.push(this.dots("simulated", motion.simulated, n, "accent", 0.0075 * size));
     if (motion.baseline) this.layers.push(this.dots("no physics", motion.baseline, n, "sun", 0.005 * size));
@@ -58,9 +59,9 @@ class Space {
 
   // The lowest and highest coordinates of all that is drawn, over all frames.
   bounds() {
-    const { measured, simulated, baseline, sheets, lines, ticks } = this.motion;
+    const { masses, measured, simulated, baseline, sheets, lines, ticks } = this.motion;
     const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-    for (const x of [measured, simulated, baseline, ...[...sheets, ...lines, ...ticks].map((part) => part.places)])
+    for (const x of [masses, measured, simulated, baseline, ...[...sheets, ...lines, ...ticks].map((part) => part.places)])
       for (let i = 0; x && i < x.length; ++i)
         if (x[i] === x[i]) { low[i % 3] = Math.min(low[i % 3], x[i]); high[i % 3] = Math.max(high[i % 3], x[i]); }
     return { low, high };
@@ -71,10 +72,12 @@ class Space {
     return Array.from({ length: 8 }, (_, k) => new THREE.Vector3(...[0, 1, 2].map((c) => ((k >> c) & 1 ? high : low)[c])));
   }
 
-  // From the side on which the motion is widest, so far away that all of it is in the picture.
+  // From the side on which the motion is widest, so far away that all of it is in the picture. A cloth often swings
+  // along its normal, so it is seen half from there.
   look() {
     const { up, camera } = this, across = this.widest(up), toward = new THREE.Vector3().crossVectors(across, up).normalize();
-    const from = toward.multiplyScalar(1.6).addScaledVector(across, 0.5).addScaledVector(up, 0.45).normalize();
+    const [side, ahead] = this.motion.sheets.length ? [1.2, 1.2] : [1.6, 0.5];
+    const from = toward.multiplyScalar(side).addScaledVector(across, ahead).addScaledVector(up, 0.45).normalize();
     const right = new THREE.Vector3().crossVectors(up, from).normalize(), above = new THREE.Vector3().crossVectors(from, right);
     const middle = new THREE.Vector3(...this.box.low.map((low, c) => 0.5 * (low + this.box.high[c])));
     const half = Math.tan((0.5 * camera.fov * Math.PI) / 180), aspect = this.host.clientWidth / Math.max(this.host.clientHeight, 1) || 1;

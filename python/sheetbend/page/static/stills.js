@@ -26,6 +26,7 @@ class Stills {
       for (const part of motion.lines) this.path(pen, at, part, frame);
       for (const part of motion.sheets) this.wires(pen, at, part, frame);
       for (const part of motion.ticks) this.ticks(pen, at, part, frame);
+      this.points(pen, at, motion.masses, motion.masses ? motion.masses.length / 3 / motion.frames : 0, frame, "ink", 5);
       this.points(pen, at, motion.measured, motion.markers.length, frame, "gray");
       this.points(pen, at, motion.simulated, motion.markers.length, frame, "accent");
     }
@@ -60,14 +61,14 @@ class Stills {
     pen.lineWidth = 1;
   }
 
-  points(pen, at, x, count, frame, tone) {
+  points(pen, at, x, count, frame, tone, radius = 2.2) {
     if (!x) return;
     pen.fillStyle = color(tone);
     for (let n = 0; n < count; ++n) {
       const i = 3 * (frame * count + n);
       if (x[i] !== x[i]) continue;
       pen.beginPath();
-      pen.arc(...at(x, i), 2.2, 0, 7);
+      pen.arc(...at(x, i), radius, 0, 7);
       pen.fill();
     }
   }
