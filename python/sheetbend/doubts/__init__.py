@@ -12,14 +12,14 @@
 4.  Do parts of the data contradict each other? `beginnings`: of motions; `contradictions`: separate parts, another
     start, motion that was held out; `missing_force`: flights.
 5.  Were the recordings read right? `misread`: axes, units, order of markers; `misread_forces`;
-    `lost_frames`; `implausible`: units of
-    what was given.
+    `lost_frames`; `smoothed`: filters; `at_limits`: sensors at the end of their range; `implausible`: units of what
+    was given.
 6.  What does it rest on? `given`: what an error of each given value moves. `told` lists these values and what an
     error of each changes, with `told_words`, `tangents` and `told_inputs` (errors that change inputs of a scene). Some
     of them are in `held_directions`, `lead`, `isotropy`, `sensor_errors`, `marker_mass` and `draft`.
 7.  Is a given value wrong, or does the model lack a part? `wrong_given` tests all of them: `causes` and
     `two_directions` find the one or two that explain the residuals, among the directions of `lacking`:
-    `missing_parts`, `losses_at_zero` and `cloth_size`. `spin` tests the ends of rods.
+    `missing_parts`, `losses_at_zero`, `cloth_size`, `pinned_ends` and `smoothed`. `spin` tests the ends of rods.
 8.  Does the motion lose energy in another way? `missing_loss`, `held_losses` and `losses_beside_contacts` test it to
     first order (`directions`), `other_losses`, `absent_damping` and `absent_bounce` by fits (`more_parameters`).
 """

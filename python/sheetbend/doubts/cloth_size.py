@@ -1,4 +1,4 @@
-"""Whether a cloth is larger than its mesh says, along warp or weft.
+"""Whether a cloth is larger than its mesh says, along warp or weft, or its yarns run in another direction.
 
 A size that is fitted is not asked for. Masses, areas, and what a cloth's membrane and its bending take as the flat
 shape all follow from the material coordinates, so that the cloth made again from slightly longer coordinates tells
@@ -9,6 +9,7 @@ what is pinned stands that much farther apart, or the start is as it was told, a
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 
 import numpy as np
 
@@ -21,8 +22,10 @@ from ..quantities.wording import short
 from ..scene.scene import Scene
 from .tangents import Input, tangents
 from .told import Told
+from .told_inputs import DEGREE
 
-STEP = 1e-4  # of the size, to either side
+STEP = 1e-4  # of the size, and rad, to either side
+FARTHEST = 0.3  # rad: first order tells no larger angle
 FLAT = 1e-6  # of the size: how far a start that is flat may be from it
 AXES = ("warp", "weft")
 OWN = ("compliance", "damping", "rest")  # arrays with entries of constraints
@@ -30,8 +33,9 @@ PARTICLES = ("mass", "drag_linear", "drag_quadratic")
 
 
 def cloth_sizes(problem: FitProblem, u: Array, i: int) -> list[Told]:
-    """Directions of the sizes of the cloths of the i-th experiment, relative; none where its motion has no answer at
-    u (free,), or where the scene holds its cloths in another way than it was told. Takes one set of tangents."""
+    """Directions of the sizes of the cloths of the i-th experiment, relative, and of their grain, rad; none where its
+    motion has no answer at u (free,), or where the scene holds its cloths in another way than it was told. Takes one
+    set of tangents."""
     e = problem.experiments[i]
     theta, slots, _ = problem.known(u)
     values = dict(zip(e.scene.quantities, theta[slots[i]].tolist(), strict=True))
@@ -45,7 +49,7 @@ def cloth_sizes(problem: FitProblem, u: Array, i: int) -> list[Told]:
                 continue
             label = f"size of {name} along the {along}"
             each = {
-                label: _larger(e.scene, cloth, values, axis),
+                label: _changed(e.scene, cloth, values, partial(_longer, axis=axis)),
                 f"{label}: start": list(_longer_start(e.scene, cloth, axis)),
             }
             of, start = ({key: inputs} if inputs else {} for key, inputs in each.items())
@@ -53,6 +57,10 @@ def cloth_sizes(problem: FitProblem, u: Array, i: int) -> list[Told]:
             directions += _told(name, label, f" along the {along}", [*of], [*start])
             made, starts = [*made, *of], [*starts, *start]
         directions += _told(name, f"size of {name}", "", made, starts)
+        if turned := _changed(e.scene, cloth, values, _turned):
+            label = f"grain of {name}"
+            added[label] = turned
+            directions.append((label, _turns(name), [label]))
     if not directions:
         return []
     try:
@@ -76,12 +84,25 @@ def _told(
         yield f"{label}, start", _says(name, along, "and its start and the places of its pins with it"), made + starts
 
 
-def _larger(scene: Scene, cloth: Cloth, values: Mapping[str, float], axis: int) -> list[Input]:
-    """What a larger size along an axis of the material adds to input arrays, relative."""
+def _longer(material: Array, size: float, axis: int) -> Array:
+    """Material coordinates that are longer along an axis, relative."""
+    return material * np.where(np.arange(2) == axis, 1.0 + size, 1.0)
+
+
+def _turned(material: Array, angle: float) -> Array:
+    """Material coordinates of a cloth whose yarns are turned away from its weft."""
+    c, s = np.cos(angle), np.sin(angle)
+    return material @ np.array([[c, s], [-s, c]])
+
+
+def _changed(
+    scene: Scene, cloth: Cloth, values: Mapping[str, float], change: Callable[[Array, float], Array]
+) -> list[Input]:
+    """What a change of its material coordinates adds to input arrays, per unit of the change."""
     held = {*scene.pinned, *scene.boundary.driven}
     for still in ((), tuple(np.flatnonzero([int(p) in held for p in cloth.particles]).tolist())):
         try:
-            ends = [_alone(cloth, 1.0 + side * STEP, axis, still) for side in (-1.0, 1.0)]
+            ends = [_alone(cloth, change(cloth.mesh.material, side * STEP), still) for side in (-1.0, 1.0)]
         except SceneError:
             continue
         known = {g.name: g.particles for g in scene.groups}
@@ -99,13 +120,11 @@ def _are_same(known: Array | None, alone: Array, cloth: Cloth) -> bool:
     return np.array_equal(known[vertices], cloth.particles[alone[vertices]])
 
 
-def _alone(cloth: Cloth, size: float, axis: int, still: tuple[int, ...]) -> Scene:
-    """A scene of the cloth alone, made again with another size."""
-    mesh, scale = cloth.mesh, np.ones(2)
-    scale[axis] = size
-    scene = Scene("cloth")
-    longer = TriangleMesh(mesh.vertices, mesh.triangles, mesh.material * scale, dict(mesh.sets))
-    add_cloth(scene, longer, cloth.name, fabric=cloth.fabric, held=still, **cloth.numbers, **cloth.sizes)
+def _alone(cloth: Cloth, material: Array, still: tuple[int, ...]) -> Scene:
+    """A scene of the cloth alone, made again with other material coordinates."""
+    mesh, scene = cloth.mesh, Scene("cloth")
+    other = TriangleMesh(mesh.vertices, mesh.triangles, material, dict(mesh.sets))
+    add_cloth(scene, other, cloth.name, fabric=cloth.fabric, held=still, **cloth.numbers, **cloth.sizes)
     return scene
 
 
@@ -161,3 +180,13 @@ def _says(name: str, along: str, how: str) -> Callable[[float], str]:
     return lambda size: (
         f"{name} were {short(100 * abs(size), 2)} % {'larger' if size > 0 else 'smaller'}{along} than its mesh, {how}"
     )
+
+
+def _turns(name: str) -> Callable[[float], str]:
+    def says(angle: float) -> str:
+        if abs(angle) > FARTHEST:
+            return f"the yarns of {name} ran in other directions than its mesh has them"
+        way = "away from" if angle > 0 else "toward"
+        return f"the warp of {name} ran {short(abs(angle) / DEGREE, 2)} degrees {way} the weft of its mesh"
+
+    return says

@@ -11,6 +11,7 @@ from ..minimum.problem import FitProblem
 from ..quantities.parameters import Parameters
 from ..quantities.wording import short
 from ..scene.scene import Scene
+from .at_limits import at_limits
 from .other_units import other_units
 
 STEEL = 8000.0  # kg/m^3: what ropes and sheets are made of is hardly ever denser
@@ -30,7 +31,7 @@ def other_than_meant(experiments: Sequence[Experiment], parameters: Parameters |
     """The same, before a fit; None of a scene of which nothing is fitted."""
     free = set() if parameters is None else {parameters.roots[name][0] for name in parameters.free}
     known = {name: q.value for name, q in quantities_of(experiments).items() if name not in free}
-    found = (words for e in experiments for words in (*_of(known, e.scene), *other_units(e, free)))
+    found = (words for e in experiments for words in (*_of(known, e.scene), *other_units(e, free), *at_limits(e)))
     return tuple(dict.fromkeys(found))
 
 

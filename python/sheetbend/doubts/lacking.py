@@ -1,4 +1,4 @@
-"""Directions in which the residuals of a fit would move by parts that its model lacks."""
+"""Directions in which the residuals of a fit would move by what its model lacks, or what was done to its recording."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from ..minimum.problem import FitProblem
 from .cloth_size import cloth_sizes
 from .losses_at_zero import touches
 from .missing_parts import missing_parts
+from .pinned_ends import pinned_ends
+from .smoothed import smoothed
 from .told import Told
 
 
@@ -19,11 +21,12 @@ class Lacking:
 
     def __init__(self, problem: FitProblem, u: Array) -> None:
         self._experiments = problem.experiments
-        self._parts, self._sizes = (cache(partial(made, problem, u)) for made in (missing_parts, cloth_sizes))
+        self._parts = cache(partial(missing_parts, problem, u))
+        self._others = [cache(partial(made, problem, u)) for made in (cloth_sizes, pinned_ends, smoothed)]
 
     def of(self, group: Sequence[int]) -> list[Told]:
         """The directions of a group of motions, each as an error of the model."""
-        return [one for i in self._moving(group) for one in (*self._parts(i), *self._sizes(i))]
+        return [one for i in self._moving(group) for made in (self._parts, *self._others) for one in made(i)]
 
     def beside_contacts(self, group: Sequence[int]) -> list[Told]:
         """The directions of missing parts in a group of motions; none where none of them has contacts."""

@@ -48,6 +48,10 @@ MUCH = 2.0
 """Times the noise, and the told sigma's where that is more: what a fit that misses much leaves beyond it. Residuals are
 1.7 sigma then, or more."""
 OWN = (LATER, SLOWER, LARGER, FARTHER, ASIDE)  # errors that each recording has of its own
+FAR = 9.0
+"""Times the noise, what is left beyond it: residuals are more than three times the noise. Where nothing explains that,
+what explains a third of it is told. Where one parameter is doubtful for it, so are the others of its motion, since what
+is at work there is not known."""
 LONGEST = 5e7  # rows times directions: above, markers are asked only all together
 
 
@@ -235,8 +239,9 @@ def _directions(
 
 def doubts_of(problem: FitProblem, u: Array, judged: Identifiability, wrong: Sequence[Wrong]) -> dict[str, str]:
     """By free parameter that a wrong number would move out of its interval, why it is doubtful."""
-    estimates, found = {e.name: e for e in judged.estimates}, {}
+    estimates, found = {e.name: e for e in judged.estimates}, dict[str, str]()
     for one in wrong:
+        moved: dict[str, str] = {}
         for k, name in enumerate(problem.parameters.free):
             p, e = problem.parameters[name], estimates[name]
             reach = reach_of(p, e)
@@ -247,14 +252,21 @@ def doubts_of(problem: FitProblem, u: Array, judged: Identifiability, wrong: Seq
                 which = "With that" if len(one.words) == 1 else f"If {words},"
                 there = value_words(p, u[k], step, reach)
                 cause = _sentence(problem, one) if one.sure else _unsure(problem, one)
-                found[name] = f"{cause}. {which} it would be {there} (to first order)"
+                moved[name] = f"{cause}. {which} it would be {there} (to first order)"
+        if moved and not one.sure and one.times > FAR:
+            others = {name for i in one.motions for name in problem.acting_on(problem.experiments[i])} - set(moved)
+            why = (
+                f"{_unsure(problem, one)}. That makes {', '.join(moved)} doubtful, and what it moves here is not known"
+            )
+            moved |= {name: why for name in problem.parameters.free if name in others}
+        found |= {name: why for name, why in moved.items() if estimates[name].verdict not in UNSOUND}
     return found
 
 
 def warnings_of(problem: FitProblem, wrong: Sequence[Wrong]) -> tuple[str, ...]:
-    """The wrong numbers that explain nearly all."""
-    sure = [_sentence(problem, one) for one in wrong if one.sure]
-    return tuple(f"{words}. Check that, and mend the model or the recording" for words in sure)
+    """The wrong numbers that explain nearly all, and where very much is left those that explain a part of it."""
+    told = [(_sentence if one.sure else _unsure)(problem, one) for one in wrong if one.sure or one.times > FAR]
+    return tuple(f"{words}. Check that, and mend the model or the recording" for words in told)
 
 
 def explained_by(problem: FitProblem, wrong: Sequence[Wrong]) -> dict[str, float]:

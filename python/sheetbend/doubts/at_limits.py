@@ -1,0 +1,63 @@
+"""Readings of force sensors that stand at the end of their range.
+
+A sensor that is pushed beyond its range repeats the largest reading that it has. Noise never does: where neighboring
+readings differ by noise, equal ones in a row at the very end of all readings are a limit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..experiment.experiment import Experiment
+from ..quantities.wording import short
+from ..statistics.white_noise import white_variance
+
+Array = np.ndarray
+LEAST = 3  # equal readings in a row
+LONGER = 2.0  # times as long as any other row of equal readings: a log may repeat each reading
+CHANCE = 1e-6  # of such a row by noise, where readings are rounded
+NOISY = 0.1  # of sigma: with less noise readings may rest at one value, as those of a simulation do
+AXES = ("x", "y", "z")
+
+
+def at_limits(e: Experiment) -> Iterator[str]:
+    """A sentence for every channel of an experiment's sensors whose readings reach a limit."""
+    for sensor in e.forces:
+        channels = (
+            ("force", "N", sensor.recording.forces, sensor.sigma),
+            ("torque", "N m", sensor.recording.torques, sensor.torque_sigma),
+        )
+        for kind, unit, readings, sigma in channels:
+            for axis, channel in zip(AXES, () if readings is None else readings.T, strict=False):
+                for side, limit, count in _limits(channel[np.isfinite(channel)], sigma or 0.0):
+                    yield (
+                        f"{count} of {len(channel)} readings of the {kind} along {axis} of {sensor.name} are exactly "
+                        f"{short(limit)} {unit}, the {side} of all, in a row: the sensor seems to have reached the end "
+                        "of its range. Set these readings to NaN, which leaves them out"
+                    )
+
+
+def _limits(x: Array, sigma: float) -> Iterator[tuple[str, float, int]]:
+    """The ends of a channel's readings (n,) that are limits: which, the reading, and how often it stands there."""
+    values = np.unique(x)
+    if len(values) < LEAST:
+        return
+    for side, limit in (("smallest", values[0]), ("largest", values[-1])):
+        inside = np.concatenate([[False], x == limit, [False]])
+        free = ~(inside[1:-3] | inside[2:-2] | inside[3:-1])
+        noise = math.sqrt(white_variance(x[:-2][free], x[1:-1][free], x[2:][free]))
+        if noise <= NOISY * sigma:
+            continue
+        alike = float(np.diff(values).min()) / (2.0 * math.sqrt(math.pi) * noise)  # chance that two readings agree
+        longest, other = (_longest(x, x == limit), _longest(x, x != limit))
+        if longest >= LEAST and longest > LONGER * other and min(alike, 1.0) ** (longest - 1) < CHANCE:
+            yield side, float(limit), int(np.count_nonzero(x == limit))
+
+
+def _longest(x: Array, among: Array) -> int:
+    """The length of the longest row of equal readings among some."""
+    ends = np.flatnonzero(np.concatenate([[True], (x[1:] != x[:-1]) | ~among[1:] | ~among[:-1], [True]]))
+    return int(np.diff(ends).max(initial=0)) if among.any() else 0

@@ -1,0 +1,59 @@
+"""Whether a pin of a cloth stands elsewhere than told: of its pinned vertices the two that are farthest apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays.timeseries import Array
+from ..errors import SheetbendError
+from ..minimum.problem import FitProblem
+from ..objects.cloth import Cloth
+from ..quantities.wording import short
+from .tangents import Input, tangents
+from .told import Told
+
+
+def pinned_ends(problem: FitProblem, u: Array, i: int) -> list[Told]:
+    """Directions of the places of single pins in the i-th experiment; none where its motion has no answer at u (free,).
+    Takes one set of tangents."""
+    e = problem.experiments[i]
+    added: dict[str, Input] = {}
+    says: dict[str, Callable[[float], str]] = {}
+    for name, cloth in e.scene.cloths.items():
+        for vertex in _ends(cloth, np.isin(cloth.particles, sorted(e.scene.pinned))):
+            for axis, way in enumerate("xyz"):
+                label = f"pin {vertex} of {name} along {way}"
+                added[label] = "position", np.array([3 * int(cloth.particles[vertex]) + axis]), np.ones(1)
+                says[label] = _says(name, vertex, way)
+    if not added:
+        return []
+    try:
+        columns = tangents(problem, u, i, added, corrected=problem.corrections(u).get(e.name))
+    except SheetbendError:
+        return []
+    return [
+        Told(i, "", label, "", (0.0, ""), column, missing=says[label], signed=True)
+        for label, column in zip(added, columns.T, strict=True)
+    ]
+
+
+def _ends(cloth: Cloth, pinned: NDArray[np.bool_]) -> list[int]:
+    """Of two pinned vertices and more, the two that are farthest apart on the cloth."""
+    vertices = np.flatnonzero(pinned)
+    if len(vertices) < 2:
+        return []
+    x = cloth.mesh.vertices[vertices]
+    first = int(np.argmax(np.linalg.norm(x - x.mean(axis=0), axis=1)))
+    other = int(np.argmax(np.linalg.norm(x - x[first], axis=1)))
+    return [int(vertices[k]) for k in sorted((first, other))]
+
+
+def _says(name: str, vertex: int, way: str) -> Callable[[float], str]:
+    def says(size: float) -> str:
+        along = f"{'' if size > 0 else '-'}{way}"
+        return f"{name} were held {short(1e3 * abs(size), 2)} mm farther along {along} at vertex {vertex}"
+
+    return says

@@ -1,0 +1,102 @@
+"""Whether recorded markers were filtered.
+
+Software of motion capture often smooths markers before it writes them. That takes noise away, and motion with it: a
+rope that swings down looks damped. Two signs are asked together. The recording has far less noise between neighboring
+frames than its sigma says. And the simulated markers, filtered in the same way, explain what the fit leaves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+
+import numpy as np
+
+from ..arrays.timeseries import Array
+from ..errors import SheetbendError
+from ..minimum.problem import FitProblem
+from ..optional import require
+from ..quantities.wording import short
+from ..recording.recording import Recording
+from .told import Told
+
+FEWEST = 16  # frames
+QUIET = 0.1  # of sigma squared: more noise than that no filter would have left
+EVEN = 1e-3  # of the interval between frames: how much it may vary
+CUTOFFS = tuple(0.03 * 1.25**k for k in range(15))  # of half the frame rate
+WINDOWS = (3, 5, 7, 9, 13, 17, 25, 35)  # frames
+BENDS = 70.0  # variance of fourth differences of white noise
+
+
+def smoothed(problem: FitProblem, u: Array, i: int) -> list[Told]:
+    """Directions of the filters that explain most of what the i-th recording's markers are missed by at u (free,), one
+    of each kind; none where the recording is not even in time, or as noisy as its sigma says."""
+    e, recording = problem.experiment_at(i, u), problem.recordings[i]
+    axes = ["xyz".index(a) for a in e.axes]
+    if e.is_cloud or e.loss != "squares" or not _quiet(recording, axes, e.sigma):
+        return []
+    try:
+        shown = problem.simulate_one(i, u)[..., axes]
+    except SheetbendError:
+        return []
+    frames, seen = np.nonzero(recording.mask)
+    _, r, J = problem.evaluate_exactly(u)
+    first = problem.core.first_rows[i]
+    own = slice(first, first + len(frames) * len(axes))
+    q, _ = np.linalg.qr(J[own])
+    left = r[own] - q @ (q.T @ r[own])
+    found = []
+    for filters in (_low_passes(recording), _means(len(recording.times))):
+        best, most = None, 0.0
+        for label, says, smooth in filters:
+            column = ((smooth(shown) - shown)[frames, seen] / e.sigma).ravel()
+            beside = column - q @ (q.T @ column)
+            along, inner = float(beside @ left), float(beside @ beside)
+            if along < 0.0 and along**2 > most * inner:
+                most = along**2 / inner
+                best = Told(i, "", label, "", (0.0, ""), column, slice(0, len(column)), missing=says)
+        found += [] if best is None else [best]
+    return found
+
+
+def _quiet(recording: Recording, axes: list[int], sigma: float) -> bool:
+    """Whether the markers bend less from frame to frame than white noise of this sigma would make them."""
+    steps = np.diff(recording.times)
+    if len(recording.times) < FEWEST or np.ptp(steps) > EVEN * float(steps.mean()):
+        return False
+    x = recording.positions[..., axes]
+    bends = np.diff(x, n=4, axis=0)
+    bends = bends[np.isfinite(bends)]
+    return bends.size > 0 and float(np.mean(bends**2)) < QUIET * sigma**2 * BENDS
+
+
+Filter = tuple[str, Callable[[float], str], Callable[[Array], Array]]
+
+
+def _low_passes(recording: Recording) -> Iterator[Filter]:
+    """Butterworth filters of second order, forward and backward. A multiple of what one changes is to first order what
+    a lower cut-off does: it goes with the fourth power of frequency over cut-off."""
+    signal, nyquist = require("scipy.signal", "fit"), 0.5 / float(np.diff(recording.times).mean())
+    for part in CUTOFFS:
+        sections = signal.butter(2, part, output="sos")
+
+        def says(size: float, at: float = part * nyquist) -> str:
+            return f"its markers were filtered, with a cut-off near {short(at / max(size, 1e-3) ** 0.25, 2)} Hz"
+
+        yield f"cut-off {part:.3g}", says, partial(signal.sosfiltfilt, sections, axis=0)
+
+
+def _means(frames: int) -> Iterator[Filter]:
+    """Means over some of so many frames. A multiple of what one changes goes with the square of its width."""
+    for width in (w for w in WINDOWS if w < frames):
+
+        def says(size: float, width: int = width) -> str:
+            return f"its markers were averaged over about {short(width * max(size, 1e-3) ** 0.5, 2)} frames"
+
+        yield f"mean of {width}", says, partial(_mean, width=width)
+
+
+def _mean(x: Array, width: int) -> Array:
+    half = width // 2
+    ends = np.concatenate([2 * x[:1] - x[half:0:-1], x, 2 * x[-1:] - x[-2 : -half - 2 : -1]])
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(ends, width, axis=0).mean(axis=-1))
