@@ -11,7 +11,7 @@ import sheetbend as sb
 from sheetbend.arrays.rotations import matrices_of, quaternions_of, rotation_matrix
 from sheetbend.quantities.quantities import product
 
-DATA = Path(__file__).parent / "data" / "flights.npz"
+DATA = Path(__file__).parent / "data"
 RATE, MASS, SIDE = 148.0, 0.37, 0.1048  # Hz, kg, m
 DRAG = 0.02  # N s/m, to start from
 CORNERS = SIDE / 2 * np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])  # four of them, a tetrahedron
@@ -41,9 +41,9 @@ class Flight:
         return Flight(self.name, self.times, moved, self.quaternions)
 
 
-def flights() -> list[Flight]:
+def flights(folder: Path = DATA) -> list[Flight]:
     """All of them, in the order of the source."""
-    data = np.load(DATA)
+    data = np.load(folder / "flights.npz")
     ends = zip(data["starts"][:-1], data["starts"][1:], data["toss"], strict=True)
     return [
         Flight(f"toss {toss}", np.arange(b - a) / RATE, data["positions"][a:b], data["quaternions"][a:b])

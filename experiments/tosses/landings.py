@@ -18,12 +18,11 @@ from pathlib import Path
 
 import numpy as np
 import sheetbend as sb
-from cube import MASS, RATE, SIDE
+from cube import DATA, MASS, RATE, SIDE
 from scipy.optimize import minimize_scalar
 from sheetbend.arrays.rotations import matrices_of
 from sheetbend.quantities.quantities import Term
 
-DATA = Path(__file__).parent / "data" / "tosses.npz"
 SCALE = 1.0176  # of the data's lengths, from free flight
 SEEN = 8  # frames that a prediction starts from
 AFTER = 6  # frames from the first contact on that the fit sees
@@ -68,9 +67,9 @@ class Toss:
         return np.arange(len(self.positions)) / RATE
 
 
-def tosses() -> list[Toss]:
+def tosses(folder: Path = DATA) -> list[Toss]:
     """All of them, in the order of the source."""
-    data = np.load(DATA)
+    data = np.load(folder / "tosses.npz")
     x, q = (data[key].astype(float) for key in ("positions", "quaternions"))
     ends = zip(data["starts"][:-1], data["starts"][1:], data["toss"], data["free"], strict=True)
     return [Toss(f"toss {toss}", x[a:b], q[a:b], int(free)) for a, b, toss, free in ends]
@@ -177,8 +176,8 @@ def report(label: str, group: list[Toss], values: Mapping[str, float], seen: int
     )
 
 
-def main(count: int) -> None:
-    every = tosses()
+def main(count: int, folder: Path) -> None:
+    every = tosses(folder)
     data = every[::2][:count]
     rest = [toss for toss in every if toss not in data]
     fit = fitted(data)
@@ -200,6 +199,10 @@ def main(count: int) -> None:
 
 
 if __name__ == "__main__":
+    from make_data import cut
+
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--fit", type=int, default=30, help="how many tosses are fitted")
-    main(parser.parse_args().fit)
+    parser.add_argument("--source", type=Path, help="a folder with other tosses, as make_data.py takes it")
+    given = parser.parse_args()
+    main(given.fit, cut(given.source))

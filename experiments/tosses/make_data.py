@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 import shutil
 import sys
+import tempfile
 from itertools import pairwise
 from pathlib import Path
 
@@ -35,7 +36,7 @@ def in_hand(quaternions: np.ndarray) -> int:
     return int(off[-1]) + 2 if len(off) else 0
 
 
-def main(folder: Path) -> None:
+def main(folder: Path, to: Path) -> None:
     source = np.load(folder / "cube_tosses.npz")
     told = json.loads((folder / "cube_tosses.json").read_text())
     corners = HALF * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
@@ -57,12 +58,12 @@ def main(folder: Path) -> None:
             numbers.append(number)
             flights.append(flights[-1] + frames)
     which = np.concatenate(kept)
-    DATA.mkdir(exist_ok=True)
+    to.mkdir(exist_ok=True)
     arrays = {"starts": np.array(flights), "toss": np.array(numbers)}
-    np.savez_compressed(DATA / "flights.npz", **arrays, positions=source["position"][which], quaternions=turns[which])
+    np.savez_compressed(to / "flights.npz", **arrays, positions=source["position"][which], quaternions=turns[which])
     every = np.concatenate(whole)
     np.savez_compressed(
-        DATA / "tosses.npz",
+        to / "tosses.npz",
         starts=np.array(tosses),
         toss=source["toss"],
         free=np.array(free),
@@ -86,10 +87,19 @@ def main(folder: Path) -> None:
         "attribution": told["attribution"],
     }
     for name in ("flights.json", "tosses.json"):
-        (DATA / name).write_text(json.dumps(about, indent=1) + "\n")
-    shutil.copyfile(folder / "LICENSE.source", DATA / "LICENSE.source")
+        (to / name).write_text(json.dumps(about, indent=1) + "\n")
+    shutil.copyfile(folder / "LICENSE.source", to / "LICENSE.source")
     print(f"{len(numbers)} flights, {flights[-1]} frames")
 
 
+def cut(source: Path | None) -> Path:
+    """The folder of tosses that are cut already: the shipped ones, or a temporary one of those of another source."""
+    if source is None:
+        return DATA
+    folder = Path(tempfile.mkdtemp())
+    main(source, folder)
+    return folder
+
+
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), DATA)
