@@ -9,17 +9,17 @@ predicted from their free flight, beside predictions without physics.
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import sheetbend as sb
-from blocks import ARM, AXIS, HINGE, MASS, RATE, SIDES, Flight, level, leveled, second_block
+from blocks import ARM, AXIS, DATA, HINGE, MASS, RATE, SIDES, Flight, level, leveled, second_block
 from sheetbend.arrays.rotations import matrices_of, rotation_matrix
 from sheetbend.quantities.quantities import Term
 
-DATA = Path(__file__).parent / "data" / "tosses.npz"
 SCALE = 1.018  # of the data's lengths, from free flight
 DOWN = np.array([0.0, 0.0, -9.81 / SCALE])  # m/s^2 in the unit of the data
 FEWEST = 7  # frames of free flight from which the state at the start is known well
@@ -57,9 +57,9 @@ class Toss(Flight):
         return (self.positions + self.second()[0]) / 2.0
 
 
-def tosses() -> list[Toss]:
+def tosses(folder: Path = DATA) -> list[Toss]:
     """All of them, in the order of the source."""
-    data = np.load(DATA)
+    data = np.load(folder / "tosses.npz")
     x, q, angles = (data[key].astype(float) for key in ("positions", "quaternions", "angles"))
     ends = zip(data["starts"][:-1], data["starts"][1:], data["toss"], data["free"], strict=True)
     return [
@@ -223,10 +223,11 @@ def halves() -> tuple[list[Toss], list[Toss]]:
     return every[::2], every[1::2]
 
 
-def main() -> None:
-    seen, rest = halves()
+def main(folder: Path) -> None:
+    seen, rest = halves() if folder == DATA else ([], tosses(folder))
     values = of_both(FOUND)
-    report("the half that the numbers are from", seen, values)
+    if seen:
+        report("the half that the numbers are from", seen, values)
     report("others", rest, values)
     report(f"others with {FEWEST} frames of free flight or more", [t for t in rest if t.free >= FEWEST], values)
     plain = np.mean([without_physics(toss) for toss in rest], axis=0)
@@ -236,4 +237,8 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    from make_data import cut
+
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--source", type=Path, help="a folder with other tosses, as make_data.py takes it")
+    main(cut(parser.parse_args().source))

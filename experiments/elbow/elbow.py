@@ -1,6 +1,6 @@
 """What the free flights of two blocks on a hinge tell: the length scale, the hinge, and where the blocks will be.
 
-    python experiments/elbow/elbow.py [--flights 18]
+    python experiments/elbow/elbow.py [--flights 18] [--source FOLDER]
 
 Fits the flights in two halves, and predicts every flight from its first four frames with what the other half shows.
 """
@@ -8,6 +8,7 @@ Fits the flights in two halves, and predicts every flight from its first four fr
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 import numpy as np
 import sheetbend as sb
@@ -42,8 +43,8 @@ def predicted(flight: Flight, gravity: float, viscosity: float) -> list[float]:
     return errors
 
 
-def main(count: int) -> None:
-    every = flights()[:count]
+def main(count: int | None, folder: Path) -> None:
+    every = flights(folder)[:count]
     middle = (len(every) + 1) // 2
     halves = [every[:middle], every[middle:]]
     found = []
@@ -71,6 +72,10 @@ def main(count: int) -> None:
 
 
 if __name__ == "__main__":
+    from make_data import cut
+
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--flights", type=int, default=18)
-    main(parser.parse_args().flights)
+    parser.add_argument("--flights", type=int, help="how many of them; all by default")
+    parser.add_argument("--source", type=Path, help="a folder with other tosses, as make_data.py takes it")
+    given = parser.parse_args()
+    main(given.flights, cut(given.source))

@@ -13,6 +13,7 @@ from __future__ import annotations
 import json
 import shutil
 import sys
+import tempfile
 from itertools import pairwise
 from pathlib import Path
 
@@ -44,7 +45,7 @@ def free(x: np.ndarray, frames: np.ndarray, angles: np.ndarray) -> slice:
     return slice(quietest, quietest + LEAST)
 
 
-def main(folder: Path) -> None:
+def main(folder: Path, to: Path) -> None:
     source = np.load(folder / "elbow_tosses.npz")
     told = json.loads((folder / "elbow_tosses.json").read_text())
     x, angles, turns = source["position"], source["angle"], source["quaternion"][:, [1, 2, 3, 0]]
@@ -61,13 +62,13 @@ def main(folder: Path) -> None:
             numbers.append(number)
             starts.append(starts[-1] + len(kept[-1]))
     which = np.concatenate(kept)
-    DATA.parent.mkdir(exist_ok=True)
+    to.mkdir(exist_ok=True)
     arrays = {"positions": x[which], "quaternions": turns[which], "angles": angles[which]}
-    np.savez_compressed(DATA, starts=np.array(starts), toss=np.array(numbers), **arrays)
+    np.savez_compressed(to / "flights.npz", starts=np.array(starts), toss=np.array(numbers), **arrays)
     every = np.concatenate(whole)
     turning = [np.unwrap(angles[own]) for own in whole]
     np.savez_compressed(
-        DATA.with_name("tosses.npz"),
+        to / "tosses.npz",
         starts=np.array(tosses),
         toss=source["toss"],
         free=np.array(flown),
@@ -93,10 +94,19 @@ def main(folder: Path) -> None:
         "attribution": told["attribution"],
     }
     for name in ("flights.json", "tosses.json"):
-        DATA.with_name(name).write_text(json.dumps(about, indent=1) + "\n")
-    shutil.copyfile(folder / "LICENSE.source", DATA.parent / "LICENSE.source")
+        (to / name).write_text(json.dumps(about, indent=1) + "\n")
+    shutil.copyfile(folder / "LICENSE.source", to / "LICENSE.source")
     print(f"{len(numbers)} flights, {starts[-1]} frames")
 
 
+def cut(source: Path | None) -> Path:
+    """The folder of tosses that are cut already: the shipped ones, or a temporary one of those of another source."""
+    if source is None:
+        return DATA
+    folder = Path(tempfile.mkdtemp())
+    main(source, folder)
+    return folder
+
+
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), DATA)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import sheetbend as sb
+from cutting import cut
 from sheetbend.arrays.rotations import matrices_of, quaternions_of, rotation_matrix
 from sheetbend.quantities.quantities import product
 
@@ -41,9 +42,9 @@ class Flight:
         return Flight(self.name, self.times, moved, self.quaternions)
 
 
-def flights() -> list[Flight]:
-    """All of them, in the order of the source."""
-    data = np.load(DATA)
+def flights(folder: Path | None = None) -> list[Flight]:
+    """All of them, in the order of the source: the ones that are shipped, or those of a folder."""
+    data = np.load(DATA) if folder is None else cut(np.load(folder / "cube_tosses.npz"))[0]
     ends = zip(data["starts"][:-1], data["starts"][1:], data["toss"], strict=True)
     return [
         Flight(f"toss {toss}", np.arange(b - a) / RATE, data["positions"][a:b], data["quaternions"][a:b])

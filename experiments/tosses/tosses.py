@@ -1,6 +1,6 @@
 """What the free flights of a tossed cube tell: its length scale, its inertia, and where it will be.
 
-    python experiments/tosses/tosses.py [--flights 62]
+    python experiments/tosses/tosses.py [--flights 62] [--source FOLDER]
 
 Finds how fast the axes of the recordings turn, fits four groups of flights in the order of the source, compares what
 gravity says of the scale in the first and the second half, and predicts every flight from its first four frames with
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import sheetbend as sb
@@ -47,8 +48,8 @@ def predicted(
     return float(np.linalg.norm(origin[-1] - flight.positions[-1])), float(angle)
 
 
-def main(count: int) -> None:
-    every = flights()[:count]
+def main(count: int | None, folder: Path | None) -> None:
+    every = flights(folder)[:count]
     found: dict[str, list[tuple[float, float]]] = {name: [] for name in SHARED}
     middle = len(every) // 2
     rates = [turning(half) for half in (every[:middle], every[middle:])]
@@ -89,5 +90,9 @@ def main(count: int) -> None:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--flights", type=int, default=62)
-    main(parser.parse_args().flights)
+    parser.add_argument("--flights", type=int, help="how many of them; all by default")
+    parser.add_argument(
+        "--source", type=Path, metavar="FOLDER", help="other tosses of the source, instead of the shipped ones"
+    )
+    given = parser.parse_args()
+    main(given.flights, given.source)
