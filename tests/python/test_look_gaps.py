@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import tomllib
+import warnings
+from pathlib import Path
+
 import numpy as np
 import pytest
 import sheetbend as sb
+from sheetbend.config import build, parse
 from sheetbend.look import Take, draft, seen
-from takes import NOISE
+from takes import NOISE, rope_in_hand
 
 RATE, REST = 120, 0.5
 
@@ -44,3 +49,24 @@ def test_milliseconds_that_pass_for_seconds_are_refused() -> None:
     slow = sb.Recording(fast.positions, 1000 * fast.times, name="take")
     with pytest.raises(sb.RecordingError, match=r"8.3 s apart.*time_ms"):
         seen(slow)
+
+
+@pytest.mark.parametrize(("lost", "kept"), [([(1.0, 1.4)], [140, 251]), ([(0.0, 0.2), (2.2, 2.5)], [20, 220])])
+def test_a_hand_that_is_lost_for_a_while(tmp_path: Path, lost: list[tuple[float, float]], kept: list[int]) -> None:
+    """The draft did not run, and NumPy warned of a mean of nothing: all three markers on the hand are behind something
+    for 0.4 s, or come into view late and leave it early."""
+    take = rope_in_hand("body")
+    x = take.positions.copy()
+    for start, stop in lost:
+        x[(take.times >= start - 1e-9) & (take.times <= stop - 1e-9), :3] = np.nan
+    recording = sb.Recording(x, take.times, take.markers, name="hand")
+    recording.save(tmp_path / "take.npz")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = draft([Take(seen(recording), "take.npz")], "take")
+    (tmp_path / "take.toml").write_text(found.text)
+    build(parse(tmp_path / "take.toml"), tmp_path)
+    (read,) = tomllib.loads(found.text)["recording"]
+    assert read["frames"] == kept
+    assert read["fit"][0] == pytest.approx(kept[0] / 100) and read["held_out"][1] <= kept[1] / 100 + 1e-2
+    assert any("a, b, c, by which it is moved, are lost" in sentence for sentence in found.seen)

@@ -91,6 +91,12 @@ def new(
             show_default=False,
         ),
     ] = None,
+    at: Annotated[
+        float | None,
+        typer.Option(
+            help="Distance in m from the clamp of a beam to the only marker or laser spot on it.", show_default=False
+        ),
+    ] = None,
     units: Annotated[
         str | None, typer.Option(help="Length unit of the files: m, cm, mm, in or ft.", show_default=False)
     ] = None,
@@ -124,7 +130,7 @@ def new(
 
     Example: sheetbend new take.csv --density 0.05
     """
-    measured = Measured(density, length, weight=weight)
+    measured = Measured(density, length, weight=weight, at=at)
     run(lambda console: _new(console, files, output, measured, units, up, markers, poses), json)
 
 
@@ -141,6 +147,7 @@ def _new(
     for option, given, fix in (
         ("--density", measured.density, "give kg/m of a rope, kg/m^2 of a cloth"),
         ("--length", measured.length, "give m"),
+        ("--at", measured.at, "give m from the clamp"),
     ):
         if given is not None and not 0 < given < float("inf"):
             raise ConfigError(option, "must be positive", given, fix)
@@ -177,7 +184,7 @@ def _new(
     try:
         found = draft(takes, name, measured)
     except RecordingError as error:
-        if error.field in ("length", "poses", "weight"):
+        if error.field in ("length", "poses", "weight", "at"):
             raise ConfigError(f"--{error.field}", error.problem, error.got, error.fix) from error
         raise
     return _written(console, target, name, found, "the recording", f"sheetbend fit {target}")
@@ -221,6 +228,8 @@ def _check_mesh(files: list[Path], measured: Measured, markers: str | None, pose
         raise ConfigError("--length", "is of a rope or a beam", measured.length, "leave it out")
     if measured.weight is not None:
         raise ConfigError("--weight", "is of a rope", measured.weight, "leave it out")
+    if measured.at is not None:
+        raise ConfigError("--at", "is of a beam", measured.at, "leave it out")
     if markers is not None:
         raise ConfigError("--markers", "are of a recording", markers, "leave them out")
 

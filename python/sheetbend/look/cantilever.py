@@ -97,7 +97,7 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
 def _looked_at(s: Seen, base: tuple[int, ...], tip: tuple[int, ...], length: float | None) -> Beam | None:
     x, t = s.recording.positions, s.recording.times
     swing = along(x[:, list(tip)], dominant_direction(x[:, list(tip)]))
-    start = _turning(t, swing)
+    start = turning(t, swing)
     free = t >= start  # before it the beam is held, and a step hides the frequency
     frequency = first_frequency(t[free], swing[free])
     last = float(t[-1])
@@ -197,7 +197,7 @@ def _seen(take: Take, tip: tuple[int, ...], beam: Beam) -> dict[str, Any]:
     return {"sigma": max(take.seen.noise, 1e-3 * beam.length), "axes": axes, "offsets": offsets, "marker": places}
 
 
-def _turning(times: Array, swing: Array) -> float:
+def turning(times: Array, swing: Array) -> float:
     """s, of the first turning point after the largest speed, where a motion starts from a shape at rest: the vertex of
     the parabola through the three frames about it."""
     speed = np.gradient(swing, times)

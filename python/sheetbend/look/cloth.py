@@ -106,7 +106,9 @@ def _described(takes: Sequence[Take], measured: Measured, stands: bool) -> Descr
     if unused:
         unknown.append(f"what the markers {joined(names[k] for k in unused)} are attached to: they are left out")
     kind = ("a cloth" if len(sheets) == 1 else f"{len(sheets)} cloths") + (" at rest" if s.static else "")
-    return Description(kind, notes, unknown, _lines(takes, sheets, density, measured, free is not None))
+    lines = _lines(takes, sheets, density, measured, free is not None)
+    driving = tuple(names[k] for sheet in sheets for hold in sheet.held for k in hold.driving(s))
+    return Description(kind, notes, unknown, lines, driving=driving)
 
 
 def _freed(takes: Sequence[Take], sheets: Sequence[Sheet]) -> Freed | None:
@@ -199,7 +201,21 @@ def _looked_at(
     rests = not any(hold.moves for hold in held) and not is_slung  # a grip starts where its markers are
     starts_flat = rests and not s.static and _lies_flat(s, own)
     return Sheet(
-        name, own, flat + low, width, height, low, origin, axes, held, is_slung, starts_flat, found, wind, ride
+        name,
+        own,
+        flat + low,
+        width,
+        height,
+        low,
+        origin,
+        axes,
+        held,
+        s.static,
+        is_slung,
+        starts_flat,
+        found,
+        wind,
+        ride,
     )
 
 
@@ -253,7 +269,7 @@ def _lines(
             why["fit"] = "begins after what no marker shows has let go"
         lines += table("[[recording]]", own, why)
     for sheet in sheets:
-        lines += _parameters(sheet, density, s.static) + _guesses(sheet, measured, s.static)
+        lines += _parameters(sheet, density) + _guesses(sheet, measured)
     if winds:
         for k in np.flatnonzero(np.arange(3) != s.up):
             lines += table(f"[parameters.wind_{'xyz'[k]}]", {"lower": -20.0, "upper": 20.0})
@@ -269,7 +285,7 @@ def _cloth(s: Seen, sheet: Sheet, density: float) -> list[str]:
     cloth |= {"bending": 1e-4 * density, "membrane_damping": 5e-3, "bend_damping": 2e-2}
     if not s.static:  # air resists motion across a cloth far more than along it; drag of its particles is alike in both
         cloth |= {"air_normal": AIR, "air_tangential": 0.02}
-    cloth |= dict.fromkeys(_sizes(sheet), 1.0)
+    cloth |= dict.fromkeys(sheet.sizes, 1.0)
     origin, axes, ahead = sheet.origin, list(sheet.axes), list[str]()
     if sheet.ride is not None:
         (hold,), numbers = sheet.held, {k: i for i, k in enumerate(sheet.own)}
@@ -323,47 +339,40 @@ def _at_edge(sheet: Sheet, hold: Hold) -> list[tuple[int, list[float]]]:
     return found
 
 
-def _fitted(sheet: Sheet, density: float, static: bool) -> dict[str, tuple[float, float]]:
+def _fitted(sheet: Sheet, density: float) -> dict[str, tuple[float, float]]:
     """Bounds of what is fitted of a cloth."""
     found = {} if sheet.slung else {"bending": (1e-7 * density, 1.0 * density)}  # tension hides it on coarse cells
-    # kept at a guess they draw the wind far off: on experiments/cloth_in_wind 9 mm in the place of 3
-    tension = ("warp", "shear") if sheet.wind is not None else ("warp",) if sheet.slung else ()
-    for name, guess in {"warp": WARP, "shear": SHEAR}.items():
-        if name in tension:
-            found[name] = (0.01 * guess * density, 100.0 * guess * density)
+    for name in sheet.tension:
+        guess = {"warp": WARP, "shear": SHEAR}[name]
+        found[name] = (0.01 * guess * density, 100.0 * guess * density)
     if sheet.wind is not None:
         found["air_tangential"] = (1e-3, 1.0)
-    if not static:
+    if not sheet.static:
         found["air_normal"] = (0.02, 20.0)
     return found
 
 
-def _parameters(sheet: Sheet, density: float, static: bool) -> list[str]:
+def _parameters(sheet: Sheet, density: float) -> list[str]:
     lines = []
-    for name, (lower, upper) in _fitted(sheet, density, static).items():
+    for name, (lower, upper) in _fitted(sheet, density).items():
         lines += table(f"[parameters.{sheet.name}_{name}]", {"lower": lower, "upper": upper})
     if sheet.ride is not None:
         prior = [sheet.ride.shift, robot.CLOCK_SD]
         lines += table(f"[parameters.{robot.CLOCK}]", {"prior": prior}, {"prior": "mean and sd, s"})
-    for size in _sizes(sheet):
+    for size in sheet.sizes:
         lines += table(f"[parameters.{sheet.name}_{size}]", {"prior": [1.0, SIZE]}, {"prior": "mean and sd"})
     return lines
 
 
-def _guesses(sheet: Sheet, measured: Measured, static: bool) -> list[str]:
+def _guesses(sheet: Sheet, measured: Measured) -> list[str]:
     """How far off the numbers may be that are assumed: they count in the intervals."""
-    guessed = ["warp", "shear", "bending", *([] if static else ["membrane_damping", "bend_damping", "air_tangential"])]
-    fitted = _fitted(sheet, 1.0, static)
+    losses = [] if sheet.static else ["membrane_damping", "bend_damping", "air_tangential"]
+    guessed, fitted = ["warp", "shear", "bending", *losses], _fitted(sheet, 1.0)
     names = ([] if measured.density is not None else ["density"]) + [name for name in guessed if name not in fitted]
     lines = list[str]()
     for name in names:
         lines += table(f"[given.{sheet.name}_{name}]", {"sd": GUESS}, {"sd": "relative: a guess"})
     return lines
-
-
-def _sizes(sheet: Sheet) -> tuple[str, ...]:
-    """Of the flat fabric, those that its tension depends on: of what the markers show it is stretched there."""
-    return ("warp_size", "weft_size") if sheet.wind is not None else ("warp_size",) if sheet.slung else ()
 
 
 def _recording(take: Take, ride: robot.Riding | None) -> dict[str, Any]:

@@ -87,7 +87,7 @@ def unknown_of(s: Seen, sheets: Sequence[Sheet], measured: Measured) -> list[str
     return [
         *_of_holding(held),
         *_of_size(sheets, held),
-        *_of_stiffness(sheets, windy),
+        *_of_stiffness(sheets),
         _of_air(windy),
         _of_density(measured),
         *_of_holders_motion(s, held),
@@ -136,23 +136,32 @@ def _of_size(sheets: Sequence[Sheet], held: Sequence[Hold]) -> list[str]:
     return said
 
 
-def _of_stiffness(sheets: Sequence[Sheet], windy: bool) -> list[str]:
+def _of_stiffness(sheets: Sequence[Sheet]) -> list[str]:
     said = []
-    if windy:
+    pulls = [
+        what
+        for what, shown in {
+            "the wind's pull": any(sheet.wind is not None for sheet in sheets),
+            "its sag between its corners": any(sheet.wind is None and "shear" in sheet.tension for sheet in sheets),
+        }.items()
+        if shown
+    ]
+    if pulls:
         said.append(
             "how much the cloth is stretched: its flat size along warp and weft is fitted beside the tension, with a "
             "prior of 1 % about what the markers show. Give the sd of your own measurement where you have one"
         )
         said.append(
-            "the stiffness in tension at the start: warp and shear begin at a guess, and the wind's pull shows them"
+            f"the stiffness in tension at the start: warp and shear begin at a guess, and {joined(pulls)} "
+            f"{'shows' if len(pulls) == 1 else 'show'} them"
         )
-    elif any(sheet.slung for sheet in sheets):
+    if any(sheet.slung for sheet in sheets):
         said.append(
             "the stiffness across, in shear and in bending: a slung cloth shows that along its length, which is fitted "
             "as `..._warp`, whichever way the threads run. It is only as good as the length of the flat fabric, which "
             "is fitted beside it: an error of 0.2 % is one of 15 to 40 % of the stiffness"
         )
-    if not windy and not all(sheet.slung for sheet in sheets):
+    if any(not sheet.tension for sheet in sheets):
         said.append("the stiffness in tension: a hanging cloth hardly shows it. warp and shear are not fitted")
     return said
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from types import ModuleType
 
 import numpy as np
 
 from ..errors import RecordingError
-from . import cantilever, cloth, flight, gripped, pendulum, rope
+from . import cantilever, cloth, flight, gripped, one_point, pendulum, rope
+from .gaps import without_gaps
 from .seen import Seen
-from .take import Measured, Take
+from .take import Description, Measured, Take
 from .text import comment, joined, table
 
 FEWEST = 3  # markers of anything but a pendulum
@@ -41,8 +43,8 @@ def draft(takes: Sequence[Take], name: str, measured: Measured | None = None) ->
     """
     first = takes[0].seen
     own = [take.file for take in takes if take.seen.recording.markers != first.recording.markers]
-    for model in (pendulum, flight, cantilever, cloth, gripped, rope):
-        found = model.describe(takes if not own or model is rope else takes[:1], measured or Measured())
+    for model in (pendulum, flight, one_point, cantilever, cloth, gripped, rope):
+        found = _described(model, takes if not own or model is rope else takes[:1], measured or Measured())
         if found is not None:
             break
     else:
@@ -53,7 +55,9 @@ def draft(takes: Sequence[Take], name: str, measured: Measured | None = None) ->
         got = joined(first.recording.markers)
         if len(first.recording.markers) < FEWEST:
             fix = "record three or more on a rope, and more on a cloth"
-            raise RecordingError("markers", "are too few to tell what moves, unless it is a pendulum", got, fix)
+            raise RecordingError(
+                "markers", "are too few to tell what moves, unless it is a pendulum or a beam that swings", got, fix
+            )
         fix = "write a configuration by hand, see docs/configuration.md"
         raise RecordingError(
             "markers", "do not move like a rope, beam, cloth, pendulum or a body in free flight", got, fix
@@ -67,8 +71,24 @@ def draft(takes: Sequence[Take], name: str, measured: Measured | None = None) ->
     if measured is not None and measured.weight is not None and model is not rope:
         fix = "leave it out; correct the masses in the configuration"
         raise RecordingError("weight", "hangs at a rope or cable, and this is", found.kind, fix)
+    if measured is not None and measured.at is not None and model is not one_point:
+        fix = "leave it out: it says where the only marker on a beam is"
+        raise RecordingError("at", "is of a beam that one marker shows, and this is", found.kind, fix)
     told = (*_told(takes, found.up), *found.notes)
     return written(found.kind, name, [t.file for t in takes], told, found.unknown, found.lines)
+
+
+def _described(model: ModuleType, takes: Sequence[Take], measured: Measured) -> Description | None:
+    """What a model makes of the takes, from pieces of them where what moves it is lost for too long in the whole."""
+    found: Description | None = model.describe(takes, measured)
+    if found is None:
+        return None
+    pieces = [without_gaps(take, found.driving) for take in takes]
+    if not any(pieces):
+        return found
+    shorter = [take if piece is None else piece[0] for take, piece in zip(takes, pieces, strict=True)]
+    cut: Description | None = model.describe(shorter, measured)
+    return cut and cut._replace(notes=[*(piece[1] for piece in pieces if piece is not None), *cut.notes])
 
 
 def written(

@@ -261,8 +261,9 @@ def _clamp_angles(s: Seen, found: Held) -> None:
 def _of_hand(s: Seen, hand: tuple[int, ...], found: Held, held_before: Sequence[str]) -> str:
     """Add the grip of a hand's body; returns the end that it holds, which none held before."""
     r, order = s.recording, found.order
-    center = np.nanmean(r.positions[:, list(hand)], axis=1)
-    reach = [float(np.nanmean(np.linalg.norm(r.positions[:, k] - center, axis=1))) for k in (order[0], order[-1])]
+    x = r.positions[r.mask[:, list(hand)].any(axis=1)]
+    center = np.nanmean(x[:, list(hand)], axis=1)
+    reach = [float(np.nanmean(np.linalg.norm(x[:, k] - center, axis=1))) for k in (order[0], order[-1])]
     at, k = ("start", order[0]) if reach[0] <= reach[1] else ("end", order[-1])
     if at in held_before:
         at, k = ("end", order[-1]) if at == "start" else ("start", order[0])

@@ -80,6 +80,8 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     lines += _recordings(s, swing, pieces, arms, names[1:], radii)
     for name, entries in _parameters(arms, radii).items():
         lines += table(f"[parameters.{name}]", entries)
+    if len(arms) > 2:
+        lines += table("[fit]", {"profiles": False}, {"profiles": "true follows each number, which takes long"})
     return Description(KINDS[len(arms)], notes, unknown, lines)
 
 

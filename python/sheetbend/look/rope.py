@@ -50,7 +50,8 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
             found.unknown.append(free.unknown)
     rope = model_of(marked_by(takes, found, holding), order, measured, pushed)
     kind = "a rope at rest" if s.static else "a rope"
-    return Description(kind, notes_of(rope), unknown_of(rope), lines_of(rope))
+    driving = tuple(name for here in rope.marked for grip in here.held.grips for name in grip["markers"])
+    return Description(kind, notes_of(rope), unknown_of(rope), lines_of(rope), driving=driving)
 
 
 def _without_others(takes: Sequence[Take], measured: Measured, kept: list[str]) -> Description | None:

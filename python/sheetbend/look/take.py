@@ -15,18 +15,20 @@ from .text import table
 
 @dataclass(frozen=True)
 class Take:
-    """A recording for a draft: what it shows, how the configuration calls its file and its unit, and a sentence about
-    the unit, if there is one."""
+    """A recording for a draft: what it shows, how the configuration calls its file and its unit, a sentence about the
+    unit, if there is one, and the first frame and the one behind the last, if only these are used."""
 
     seen: Seen
     file: str
     units: str | None = None
     about_units: str = ""
+    frames: tuple[int, int] | None = None
 
     @property
     def reading(self) -> dict[str, Any]:
         """Keys of [[recording]] that say how the file is read."""
-        return {"file": self.file, "units": self.units, "mend": True if self.seen.recording.mends else None}
+        mend = True if self.seen.recording.mends else None
+        return {"file": self.file, "units": self.units, "mend": mend, "frames": self.frames and list(self.frames)}
 
     @property
     def scene_lines(self) -> list[str]:
@@ -43,12 +45,14 @@ class Measured:
         length: m, of a rope or beam.
         poses: of the robot's tool that holds a cloth.
         weight: kg, of what hangs at the free end of a rope; 0 of an end that is free and carries nothing.
+        at: m, from the clamp of a beam to the only marker on it.
     """
 
     density: float | None = None
     length: float | None = None
     poses: Poses | None = None
     weight: float | None = None
+    at: float | None = None
 
 
 class Description(NamedTuple):
@@ -60,6 +64,7 @@ class Description(NamedTuple):
         unknown: sentences about what is not known, and what stands in its place.
         lines: of the configuration, without its head.
         up: 0, 1 or 2, the axis that points up where the motion shows it.
+        driving: names of the markers that move something.
     """
 
     kind: str
@@ -67,6 +72,7 @@ class Description(NamedTuple):
     unknown: list[str]
     lines: list[str]
     up: int | None = None
+    driving: tuple[str, ...] = ()
 
 
 GAP = 0.1  # s, for which a marker that moves something may be lost
