@@ -3,10 +3,12 @@ what a motion shows."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
+import pytest
 import sheetbend as sb
 from numpy.typing import ArrayLike
 from oracles import integration
@@ -195,6 +197,23 @@ def by_fabric(read: Callable[[sb.Fabric], float], fabric: sb.Fabric, field: str,
     step = share * (value or 1.0)
     high, low = (read(replace(fabric, **{field: value + sign * step})) for sign in (1.0, -1.0))
     return (high - low) / (2.0 * step)
+
+
+def expect_exact(report: sb.GradientReport, *felt: str) -> None:
+    """A check has found all gradients exact, and that of these quantities more than rounding."""
+    assert report.passed, str(report)
+    rows = {row.name: row for row in report.rows}
+    for name in felt:
+        assert not rows[name].unfelt and rows[name].gradient != 0.0, name
+
+
+@contextmanager
+def refusal(field: str, words: str = "", error: type[sb.InputError] = sb.SceneError) -> Iterator[None]:
+    """What is done inside is refused: the error names the field, says these words and has a fix."""
+    with pytest.raises(error) as caught:
+        yield
+    assert caught.value.field == field and caught.value.fix
+    assert words in f"{caught.value.problem}. {caught.value.fix}", str(caught.value)
 
 
 def expect_modes_scale(scene: sb.Scene, field: StiffnessField, q: Array, group: str) -> None:
