@@ -1,7 +1,7 @@
 #include "core/contact/box_grid.h"
 
 #include <algorithm>
-#include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 
@@ -9,92 +9,118 @@ namespace sheetbend {
 namespace {
 
 constexpr double most_per_box = 16.0;           // cells on average
-constexpr double most_cells = 1024.0 * 1024.0;  // along an axis, whose number takes 21 bits
+constexpr double most_cells = 1024.0 * 1024.0;  // along an axis
 
-using Cell = std::array<std::int64_t, 3>;
+bool is_finite(const Box& box) {
+  for (int d = 0; d < 3; ++d)
+    if (!std::isfinite(box.high[d] - box.low[d])) return false;
+  return true;
+}
 
-struct Grid {
-  double origin[3], size;
+bool overlap(const Box& a, const Box& b) {  // not where one is not finite
+  for (int d = 0; d < 3; ++d)
+    if (!(a.high[d] >= b.low[d] && b.high[d] >= a.low[d])) return false;
+  return true;
+}
 
-  Cell of(const double* p) const {
-    Cell c;
-    for (int d = 0; d < 3; ++d) c[d] = static_cast<std::int64_t>(std::floor((p[d] - origin[d]) / size));
-    return c;
-  }
-  static std::uint64_t key(const Cell& c) {
-    return static_cast<std::uint64_t>(c[0]) << 42 | static_cast<std::uint64_t>(c[1]) << 21 |
-           static_cast<std::uint64_t>(c[2]);
-  }
-};
-
-// Cells as wide as boxes are on average; wider where some boxes would cover too many.
-Grid grid_around(const std::vector<const Box*>& boxes) {
-  Grid g{{0.0, 0.0, 0.0}, 0.0};
-  double extent = 0.0;
-  for (int d = 0; d < 3; ++d) {
-    double low = boxes.front()->low[d], high = boxes.front()->high[d];
-    for (const Box* b : boxes) low = std::min(low, b->low[d]), high = std::max(high, b->high[d]);
-    g.origin[d] = low;
-    extent = std::max(extent, high - low);
-  }
-  for (const Box* b : boxes) {
+// As wide as boxes are on average; wider where some would cover too many cells.
+double width_of_cells(const std::vector<Box>& boxes, double extent) {
+  double size = 0.0;
+  for (const Box& b : boxes) {
     double widest = 0.0;
-    for (int d = 0; d < 3; ++d) widest = std::max(widest, b->high[d] - b->low[d]);
-    g.size += widest / static_cast<double>(boxes.size());
+    for (int d = 0; d < 3; ++d) widest = std::max(widest, b.high[d] - b.low[d]);
+    if (std::isfinite(widest)) size += widest / static_cast<double>(boxes.size());
   }
-  g.size = std::max({g.size, extent / most_cells, 1e-300});
+  size = std::max({size, extent / most_cells, 1e-300});
   const auto covered = [&] {
     double sum = 0.0;
-    for (const Box* b : boxes) {
+    for (const Box& b : boxes) {
       double cells = 1.0;
-      for (int d = 0; d < 3; ++d) cells *= std::floor((b->high[d] - b->low[d]) / g.size) + 2.0;
-      sum += cells;
+      for (int d = 0; d < 3; ++d) cells *= std::floor((b.high[d] - b.low[d]) / size) + 2.0;
+      if (std::isfinite(cells)) sum += cells;
     }
     return sum;
   };
-  while (covered() > most_per_box * static_cast<double>(boxes.size())) g.size *= 2.0;
-  return g;
-}
-
-bool overlap(const Box& a, const Box& b) {
-  for (int d = 0; d < 3; ++d)
-    if (a.high[d] < b.low[d] || b.high[d] < a.low[d]) return false;
-  return true;
+  while (covered() > most_per_box * static_cast<double>(boxes.size())) size *= 2.0;
+  return size;
 }
 
 }  // namespace
 
+BoxGrid::BoxGrid(std::vector<Box> boxes, bool listed) : boxes_(std::move(boxes)) {
+  double extent = 0.0;
+  for (int d = 0; d < 3; ++d) {
+    double low = HUGE_VAL, high = -HUGE_VAL;
+    for (const Box& b : boxes_)
+      if (is_finite(b)) low = std::min(low, b.low[d]), high = std::max(high, b.high[d]);
+    origin_[d] = low;
+    extent = std::max(extent, high - low);
+  }
+  cell_ = width_of_cells(boxes_, extent);
+  first_.assign(std::bit_ceil(4 * boxes_.size() + 1), -1);
+  for (int i = 0; listed && i < static_cast<int>(boxes_.size()); ++i) list(i);
+}
+
+template <class Visit>
+bool BoxGrid::for_each_cell(const Box& box, Visit&& visit) const {
+  std::int64_t from[3], to[3];
+  double cells = 1.0;
+  for (int d = 0; d < 3; ++d) {
+    const double low = std::floor((box.low[d] - origin_[d]) / cell_);
+    const double high = std::floor((box.high[d] - origin_[d]) / cell_);
+    cells *= high - low + 1.0;
+    if (!(std::max(std::abs(low), std::abs(high)) < 1e15 && cells <= most_per_box + static_cast<double>(boxes_.size())))
+      return false;
+    from[d] = static_cast<std::int64_t>(low), to[d] = static_cast<std::int64_t>(high);
+  }
+  for (std::int64_t x = from[0]; x <= to[0]; ++x)
+    for (std::int64_t y = from[1]; y <= to[1]; ++y)
+      for (std::int64_t z = from[2]; z <= to[2]; ++z) {
+        const auto hash = static_cast<std::uint64_t>(x) * 0x9E3779B97F4A7C15u +
+                          static_cast<std::uint64_t>(y) * 0xC2B2AE3D27D4EB4Fu +
+                          static_cast<std::uint64_t>(z) * 0x165667B19E3779F9u;
+        visit((hash >> 32) & (first_.size() - 1));
+      }
+  return true;
+}
+
+void BoxGrid::list(int i) {
+  if (!is_finite(boxes_[i])) return;
+  const bool listed = for_each_cell(boxes_[i], [&](std::size_t at) {
+    entries_.push_back({i, first_[at]});
+    first_[at] = static_cast<int>(entries_.size()) - 1;
+  });
+  if (!listed) wide_.push_back(i);
+}
+
+void BoxGrid::move(int i, const Box& to) {
+  boxes_[i] = to;
+  list(i);
+}
+
+const std::vector<int>& BoxGrid::around(const Box& box) {
+  found_.clear();
+  if (!is_finite(box)) return found_;
+  const auto compare = [&](int i) {
+    if (overlap(boxes_[i], box)) found_.push_back(i);
+  };
+  const bool narrow = for_each_cell(box, [&](std::size_t at) {
+    for (int e = first_[at]; e >= 0; e = entries_[e].next) compare(entries_[e].box);
+  });
+  for (const int i : wide_) compare(i);
+  if (!narrow)
+    for (const Entry& e : entries_) compare(e.box);
+  std::sort(found_.begin(), found_.end());
+  found_.erase(std::unique(found_.begin(), found_.end()), found_.end());
+  return found_;
+}
+
 std::vector<std::pair<int, int>> overlaps(const std::vector<Box>& a, const std::vector<Box>& b, bool itself) {
   std::vector<std::pair<int, int>> found;
-  std::vector<const Box*> boxes;
-  for (const Box& box : a) boxes.push_back(&box);
-  const auto first_of_b = static_cast<int>(boxes.size());
-  if (!itself)
-    for (const Box& box : b) boxes.push_back(&box);
-  if (a.empty() || (!itself && b.empty())) return found;
-  const Grid grid = grid_around(boxes);
-  std::vector<Cell> low(boxes.size());
-  std::vector<std::pair<std::uint64_t, int>> entries;
-  for (int i = 0; i < static_cast<int>(boxes.size()); ++i) {
-    const Cell from = low[i] = grid.of(boxes[i]->low), to = grid.of(boxes[i]->high);
-    Cell c;
-    for (c[0] = from[0]; c[0] <= to[0]; ++c[0])
-      for (c[1] = from[1]; c[1] <= to[1]; ++c[1])
-        for (c[2] = from[2]; c[2] <= to[2]; ++c[2]) entries.emplace_back(Grid::key(c), i);
-  }
-  std::sort(entries.begin(), entries.end());
-  const auto compare = [&](std::uint64_t key, int i, int j) {
-    Cell common;  // the first cell that both cover: the only one in which they are looked at
-    for (int d = 0; d < 3; ++d) common[d] = std::max(low[i][d], low[j][d]);
-    if (Grid::key(common) == key && overlap(*boxes[i], *boxes[j])) found.emplace_back(i, itself ? j : j - first_of_b);
-  };
-  for (std::size_t begin = 0, end; begin < entries.size(); begin = end) {
-    end = begin + 1;
-    while (end < entries.size() && entries[end].first == entries[begin].first) ++end;
-    for (std::size_t p = begin; p < end; ++p)  // boxes of a come first
-      for (std::size_t q = p + 1; q < end; ++q)
-        if (itself || (entries[p].second < first_of_b && entries[q].second >= first_of_b))
-          compare(entries[p].first, entries[p].second, entries[q].second);
+  BoxGrid grid(itself ? a : b, !itself);
+  for (int i = 0; i < static_cast<int>(a.size()); ++i) {
+    for (const int j : grid.around(a[i])) found.emplace_back(itself ? j : i, itself ? i : j);
+    if (itself) grid.list(i);  // so each pair is looked at once
   }
   return found;
 }

@@ -1,4 +1,4 @@
-// Which boxes of two lists overlap, by a uniform grid of cells: each box is sorted into the cells that it covers, and compared within them.
+// Which boxes overlap, by a uniform grid of cells.
 #pragma once
 
 #include <utility>
@@ -8,6 +8,36 @@ namespace sheetbend {
 
 struct Box {
   double low[3], high[3];
+};
+
+// Boxes, each listed in the cells that it covers. One that covers more cells than there are boxes is compared with all.
+class BoxGrid {
+ public:
+  BoxGrid() = default;
+  explicit BoxGrid(std::vector<Box> boxes) : BoxGrid(std::move(boxes), true) {}
+
+  void move(int i, const Box& to);
+
+  // The numbers of all that overlap a box, in ascending order; until the next call. None where the box is not finite.
+  const std::vector<int>& around(const Box& box);
+
+ private:
+  friend std::vector<std::pair<int, int>> overlaps(const std::vector<Box>& a, const std::vector<Box>& b, bool itself);
+  BoxGrid(std::vector<Box> boxes, bool listed);
+
+  struct Entry {
+    int box, next;  // in the same place of `first_`; -1 at the end
+  };
+
+  void list(int i);
+  template <class Visit>
+  bool for_each_cell(const Box& box, Visit&& visit) const;  // false, without a visit, where they are too many
+
+  std::vector<Box> boxes_;
+  double origin_[3]{}, cell_ = 1.0;
+  std::vector<int> first_;      // by the hash of a cell
+  std::vector<Entry> entries_;  // some of boxes that have moved away
+  std::vector<int> wide_, found_;
 };
 
 // Pairs (i, j) of boxes a[i] and b[j] that overlap, each once, in no particular order; with `itself`, b is a and i < j.

@@ -1,7 +1,10 @@
 // The flights of a scene's balls in a substep. Their impacts, with each other and with colliders, happen in the order of time: after each, those that it
-// changes are looked for anew. At the same instant the order is that of balls. What is found and in which order are values, of which nothing is differentiated.
+// changes are looked for anew, among balls whose ways may cross. At the same instant the order is that of balls. What is found and in which order are values,
+// of which nothing is differentiated.
 #pragma once
 
+#include <functional>
+#include <queue>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -18,33 +21,36 @@ class BallFlights {
 
   BallFlights(const ContactSource<T>& source, const ColliderPoses<S>& poses, const Coordinates<T>& q)
       : source_(source), poses_(poses), balls_(source.scene.balls) {
+    std::vector<Box> ways;
     for (const Bouncer& own : balls_.members) {
       const int ball = static_cast<int>(flying_.size());
       const Flight<S> f = flight_of(source, own.node, source.read(Vec3<T>(q.of(own.node))));
-      flying_.push_back({ball_of(source, ball, f), {}, own.contacts, 0});
+      flying_.push_back({ball_of(source, ball, f), {}, own.contacts, 0, -1});
       take_values(flying_.back());
+      ways.push_back(way_of(flying_.back().values));
     }
+    ways_ = BoxGrid(std::move(ways));
     for (const int contact : contacts_of_balls())
       surfaces_.emplace_back(contact, as_values(source.surface(poses, contact)));
   }
 
   // Lets them fly to the end of the substep, and adds their impacts.
   void fly(std::vector<Impact<S>>& impacts) {
-    for (int i = 0; i < count(); ++i) look_for_surfaces(i);
-    for (const auto& [i, j] : near_each_other()) look_for_meeting(i, j);
+    for (int i = 0; i < count(); ++i) {
+      look_for_surfaces(i);
+      for (const int j : ways_.around(way_of(flying_[i].values)))
+        if (j > i) look_for_meeting(i, j);
+    }
     while (!next_.empty()) {
-      const auto first = std::min_element(next_.begin(), next_.end());
-      const Event event = *first;
-      next_.erase(first);
+      const Event event = next_.top();
+      next_.pop();
+      if (is_over(event)) continue;
       if (event.other < 0 && event.rests) {
         std::erase(flying_[event.one].contacts, event.contact);  // left to the projection
         look_for_surfaces(event.one);
         continue;
       }
       impacts.push_back(event.other < 0 ? bounce(event) : hit(event));
-      std::erase_if(resting_, [&](const auto& pair) { return event.has(pair.first) || event.has(pair.second); });
-      if (event.rests) resting_.emplace_back(event.one, event.other);
-      std::erase_if(next_, [&](const Event& e) { return e.has(event.one) || e.has(event.other); });
       look_from(event.one, -1);
       if (event.other >= 0) look_from(event.other, event.one);
     }
@@ -64,6 +70,7 @@ class BallFlights {
     Ball<double> values;
     std::vector<int> contacts;  // off which it may bounce
     int impacts;
+    int rests_with;  // the ball that its last impact was with, too slow to bounce; -1 where there is none
   };
 
   struct Event {
@@ -72,10 +79,10 @@ class BallFlights {
     int contact;  // -1 where two balls meet, as `other` is where one bounces
     double time;
     bool dated, rests;
+    int impacts_of_one = 0, impacts_of_other = 0;  // as it was found
 
-    bool has(int ball) const { return ball >= 0 && (one == ball || other == ball); }
-    bool operator<(const Event& e) const {
-      return std::tie(when, one, other, contact) < std::tie(e.when, e.one, e.other, e.contact);
+    bool operator>(const Event& e) const {
+      return std::tie(when, one, other, contact) > std::tie(e.when, e.one, e.other, e.contact);
     }
   };
 
@@ -85,9 +92,32 @@ class BallFlights {
     f.values = {as_values(f.ball.flight), value_of(f.ball.radius), value_of(f.ball.mass)};
   }
 
+  // Where a ball on its way from the start of its flight on is, and a bit more.
+  static Box way_of(const Ball<double>& ball) {
+    const Flight<double>& path = ball.flight;
+    const double reach = ball.radius + 0.125 * path.left * norm(path.v_end - path.v);
+    const double a[3] = {path.x.x, path.x.y, path.x.z}, b[3] = {path.x_end.x, path.x_end.y, path.x_end.z};
+    Box box;
+    for (int d = 0; d < 3; ++d) box.low[d] = std::min(a[d], b[d]) - reach, box.high[d] = std::max(a[d], b[d]) + reach;
+    return box;
+  }
+
+  void add(Event event) {
+    event.impacts_of_one = flying_[event.one].impacts;
+    if (event.other >= 0) event.impacts_of_other = flying_[event.other].impacts;
+    next_.push(event);
+  }
+
+  // Whether one of both has flown elsewhere since.
+  bool is_over(const Event& e) const {
+    return flying_[e.one].impacts != e.impacts_of_one ||
+           (e.other >= 0 && flying_[e.other].impacts != e.impacts_of_other);
+  }
+
+  // What a ball may hit after an impact.
   void look_from(int i, int but) {
     look_for_surfaces(i);
-    for (int j = 0; j < count(); ++j)
+    for (const int j : ways_.around(way_of(flying_[i].values)))
       if (j != i && j != but) look_for_meeting(std::min(i, j), std::max(i, j));
   }
 
@@ -107,18 +137,18 @@ class BallFlights {
     if (event.contact < 0) return;
     event.when = source_.h - path.left + event.time;
     event.rests = !bounces(rule_of(source_, event.contact), path, surface_of(event.contact), event.time);
-    next_.push_back(event);
+    add(event);
   }
 
   void look_for_meeting(int i, int j) {
     const Flying &one = flying_[i], &other = flying_[j];
     if (one.impacts >= most_impacts || other.impacts >= most_impacts) return;
-    if (std::find(resting_.begin(), resting_.end(), std::pair(i, j)) != resting_.end()) return;
+    if (one.rests_with == j) return;
     const double e = value_of(source_.read(source_.in.of(Quantity::restitution)[balls_.restitution]));
     const auto found = meeting_of(rule_of_balls(source_), {one.values, other.values, e});
     if (!found) return;
     const double from = source_.h - std::min(one.values.flight.left, other.values.flight.left);
-    next_.push_back({from + found->time, i, j, -1, found->time, found->dated, found->rests});
+    add({from + found->time, i, j, -1, found->time, found->dated, found->rests});
   }
 
   Impact<S> bounce(const Event& event) {
@@ -135,31 +165,19 @@ class BallFlights {
     const BallPair<S> before = pair_of(source_, one.ball, other.ball);
     const auto after = collided(rule_of_balls(source_), before, meeting);
     one.ball.flight = after[0], other.ball.flight = after[1];
-    return {source_.lane, -1, meeting, {flown(event.one, before.one.flight), flown(event.other, before.other.flight)}};
+    const Flown<S> first = flown(event.one, before.one.flight), second = flown(event.other, before.other.flight);
+    if (event.rests) one.rests_with = event.other, other.rests_with = event.one;
+    return {source_.lane, -1, meeting, {first, second}};
   }
 
   Flown<S> flown(int i, const Flight<S>& before) {
     Flying& f = flying_[i];
     ++f.impacts;
+    if (f.rests_with >= 0) flying_[f.rests_with].rests_with = -1;
+    f.rests_with = -1;
     take_values(f);
+    ways_.move(i, way_of(f.values));
     return {balls_.members[i].node, i, before, f.ball.flight};
-  }
-
-  // Pairs whose ways may cross.
-  std::vector<std::pair<int, int>> near_each_other() const {
-    std::vector<Box> boxes;
-    for (const Flying& f : flying_) {
-      const Flight<double>& path = f.values.flight;
-      const double reach = f.values.radius + 0.125 * path.left * norm(path.v_end - path.v);
-      const double a[3] = {path.x.x, path.x.y, path.x.z}, b[3] = {path.x_end.x, path.x_end.y, path.x_end.z};
-      Box box;
-      for (int d = 0; d < 3; ++d) {
-        box.low[d] = std::min(a[d], b[d]) - reach, box.high[d] = std::max(a[d], b[d]) + reach;
-        if (!std::isfinite(box.high[d] - box.low[d])) return {};  // the substep diverges
-      }
-      boxes.push_back(box);
-    }
-    return overlaps(boxes, boxes, true);
   }
 
   std::vector<int> contacts_of_balls() const {
@@ -178,8 +196,8 @@ class BallFlights {
   const Balls& balls_;
   std::vector<Flying> flying_;
   std::vector<std::pair<int, Surface<double>>> surfaces_;
-  std::vector<std::pair<int, int>> resting_;  // whose last impact was with each other, too slow to bounce
-  std::vector<Event> next_;
+  BoxGrid ways_;
+  std::priority_queue<Event, std::vector<Event>, std::greater<>> next_;  // some of which are over
 };
 
 }  // namespace sheetbend

@@ -64,8 +64,8 @@ Sample gas_of_balls(double e, int count = 14) {
 }
 
 TEST_P(Colliding, KeepMomentumAndEnergy) {
-  for (const double e : {1.0, 0.4, 0.0}) {
-    const Sample s = gas_of_balls(e);
+  for (const auto& [e, count] : {std::pair{1.0, 14}, {0.4, 14}, {0.0, 14}, {1.0, 64}}) {
+    const Sample s = gas_of_balls(e, count);
     const Program p = program(s, 2e-3, 0.4, GetParam());
     const Inputs<const double> in{s.scene.layout, s.inputs.data()};
     const auto sums = [&](const double* v) {
@@ -89,7 +89,7 @@ TEST_P(Colliding, KeepMomentumAndEnergy) {
           overlap = std::max(overlap, in.of(Quantity::contact_radius)[i] + in.of(Quantity::contact_radius)[j] -
                                           norm(Vec3<double>(rollout.x() + 3 * i) - Vec3<double>(rollout.x() + 3 * j)));
     }
-    EXPECT_GE(impacts, 10u);
+    EXPECT_GE(impacts, count == 14 ? 10u : 100u);
     EXPECT_LE(overlap, 1e-12);
     const auto after = sums(rollout.state().v);
     for (int d = 0; d < 3; ++d) EXPECT_NEAR(after[d], before[d], 1e-12);

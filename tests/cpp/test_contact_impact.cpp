@@ -62,6 +62,28 @@ TEST(Impact, IsOfSecondOrderWithoutABounce) {
   EXPECT_LE(before, 3e-6);
 }
 
+// A particle that comes in at 5 m/s is never deeper than h/1000 of its speed, wherever in a substep it arrives.
+TEST(Impact, IsNoDeeperThanAThousandthOfTheWayOfASubstep) {
+  constexpr double h = 1e-3, v = 5.0;
+  for (const Integrator integrator : {Integrator::bdf1, Integrator::bdf2})
+    for (int phase = 0; phase < 10; ++phase) {
+      ContactBuilder b;
+      b.particle({0.0, 0.0, (4.0 + 0.1 * phase) * v * h}, 0.2, {1.0, 0.0, -v});
+      b.collider("plane", {}, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0});
+      b.contact(0.3, 0.0);
+      const Sample s = b.build(g);
+      const Plan plan = make_plan(s.scene, contact_options(h, integrator));
+      Rollout<double> rollout(s.scene, plan, s.inputs.data());
+      double lowest = 0.0;
+      for (int n = 0; n < 20; ++n) {
+        rollout.advance();
+        lowest = std::min(lowest, rollout.x()[2]);
+      }
+      EXPECT_LT(lowest, 0.0);
+      EXPECT_GE(lowest, -(v + 5.0 * g * h) * h / rigidity);
+    }
+}
+
 // A rope far above a plane, and the same rope without one.
 TEST(Impact, LeavesFreeFlightAsItIs) {
   const auto fly = [](bool above) {

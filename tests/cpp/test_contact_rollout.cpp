@@ -34,14 +34,14 @@ TEST(Contact, StopsASlidingBlockWhereItShould) {
     seed[0] = 1.0;
     const auto bar = gradient_of_end(p, s.inputs, seed);
     const Inputs<const double> in{s.scene.layout, bar.data()};
-    EXPECT_NEAR(in.of(Quantity::friction)[0], slope, 2e-6);
+    EXPECT_NEAR(in.of(Quantity::friction)[0], slope, 1e-6);
     EXPECT_NEAR(in.of(Quantity::velocity)[0], h * std::floor(2.0 / (0.3 * g * h)), 1e-6);  // h N
   }
 }
 
 TEST(Contact, HoldsABlockBelowTheCriticalAngleWithoutCreep) {
   constexpr double h = 1e-3, slope = M_PI / 6.0;
-  constexpr int steps = 400;
+  constexpr int steps = 10000;
   const auto travel = [&](double mu, double* dmu = nullptr) {
     const Sample s = block_on_plane(slope, mu, 0.0, h);
     const Program p{s.scene, make_plan(s.scene, contact_options(h)), steps};
@@ -109,6 +109,7 @@ double tension(const Capstan& c, const double* x, int i, double rest, double* se
   return (length - rest) / c.alpha;
 }
 
+// The ratio is the mean over the last tenth of the time: of the vibration that the pull begins with, substeps of 0.25 ms have damped all but 0.2 % by then.
 TEST(Contact, MultipliesARopesTensionAroundACylinder) {
   const auto pull = [&](int nodes, double EA, double speed, double time, double h, double* dmu = nullptr,
                         double* matrices = nullptr) {
@@ -117,26 +118,34 @@ TEST(Contact, MultipliesARopesTensionAroundACylinder) {
     const double rest = c.sample.inputs[scene.layout.of(Quantity::rest)];
     const Program p{scene, make_plan(scene, contact_options(h)), static_cast<int>(std::lround(time / h))};
     Rollout<double> rollout(scene, p.plan, c.sample.inputs.data());
-    double sum = 0.0;
+    double sum = 0.0, ratio = 0.0;
+    const int last = std::max(1, p.steps / 10);
     for (int n = 0; n < p.steps; ++n) {
       rollout.advance();
       sum += static_cast<double>(rollout.balance()[0].size());
+      if (n < p.steps - last) continue;
+      ratio += tension(c, rollout.x(), c.links - 1, rest) / tension(c, rollout.x(), 0, rest) / last;
     }
     if (matrices) *matrices = sum / p.steps;
-    const double before = tension(c, rollout.x(), 0, rest);
+    EXPECT_NEAR(tension(c, rollout.x(), 0, rest), 1.0, 1e-3);
     std::vector<double> seed(scene.dofs());
-    const double after = tension(c, rollout.x(), c.links - 1, rest, seed.data());
+    tension(c, rollout.x(), c.links - 1, rest, seed.data());
     if (dmu) *dmu = gradient_of_end(p, c.sample.inputs, seed)[scene.layout.of(Quantity::friction)];
-    EXPECT_NEAR(before, 1.0, 1e-3);
-    return after / before;
+    return ratio;
   };
   double dmu, matrices;
   EXPECT_NEAR(pull(60, 1e4, 0.05, 0.1, 1e-3, &dmu, &matrices), 2.566935, 1e-3);
   EXPECT_NEAR(dmu, 8.0666, 1e-3 * 8.0666);
   EXPECT_LE(matrices, 4.0);
+  for (const double h : {4e-3, 2.5e-4}) {
+    EXPECT_NEAR(pull(60, 1e4, 0.05, 0.1, h, nullptr, &matrices), 2.566935, 1e-3) << h;
+    EXPECT_LE(matrices, 4.0) << h;
+  }
   // A soft rope has to be pulled farther until all of it slides.
-  EXPECT_NEAR(pull(60, 100.0, 0.02, 0.5, 2e-3, nullptr, &matrices), 2.566935, 1e-3);
-  EXPECT_LE(matrices, 4.0);
+  for (const double h : {4e-3, 1e-3, 2.5e-4}) {
+    EXPECT_NEAR(pull(60, 100.0, 0.02, 1.0, h, nullptr, &matrices), 2.566935, 1e-3) << h;
+    EXPECT_LE(matrices, 4.0) << h;
+  }
   EXPECT_NEAR(pull(30, 1e4, 0.05, 0.1, 4e-3, nullptr, &matrices), 2.5684, 3e-3);
   EXPECT_LE(matrices, 4.0);
 }
@@ -203,7 +212,12 @@ Modes modes_of(const Program& p, const std::vector<double>& inputs) {
     for_each_contact(step, masses, [&](const auto& source, const auto& poses, int c, int i) {
       const Contact& contact = p.scene.contacts[c];
       const auto z = poses.next[contact.collider].in_frame(source.point(contact, i, rollout.x()));
-      const auto at = touch(p.scene.colliders[contact.collider].any(), z, source.numbers(poses, c, i));
+      const auto numbers = source.numbers(poses, c, i);
+      const auto at = touch(p.scene.colliders[contact.collider].any(), z, numbers);
+      if (!p.scene.colliders[contact.collider].grid) {
+        EXPECT_GE(at.normal, 0.0);
+        EXPECT_LE(norm(at.tangential), numbers.friction * at.normal * (1.0 + 1e-9));
+      }
       bool& before = touching[{c, i}];
       modes.began += at.pushes && !before;
       modes.ended += before && !at.pushes;

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
 #include <random>
 
 #include "adjoint/solver/block_pairs_vjp.h"
@@ -247,6 +248,44 @@ TEST(Pairs, AreFoundOnTheirWays) {
   EXPECT_LE(together.size(), near_at_rest.size() + 5);
 }
 
+bool meet(const Box& p, const Box& q) {
+  for (int d = 0; d < 3; ++d)
+    if (p.high[d] < q.low[d] || q.high[d] < p.low[d]) return false;
+  return true;
+}
+
+// Boxes that move, far away and wide too, and one that is not finite.
+TEST(Pairs, AreFoundByAGridWhileBoxesMove) {
+  constexpr int count = 60;
+  const auto any_box = [](double spread, double size) {
+    Box box;
+    for (int d = 0; d < 3; ++d) {
+      box.low[d] = uniform(-spread, spread);
+      box.high[d] = box.low[d] + uniform(0.0, size);
+    }
+    return box;
+  };
+  std::vector<Box> boxes;
+  for (int i = 0; i < count; ++i) boxes.push_back(any_box(1.0, 0.4));
+  boxes[5].low[1] = std::numeric_limits<double>::quiet_NaN();
+  BoxGrid grid(boxes);
+  std::size_t all = 0;
+  for (int turn = 0; turn < 300; ++turn) {
+    const int moved = turn % count;
+    boxes[moved] = turn % 50 == 7    ? any_box(1e18, 1.0)
+                   : turn % 50 == 17 ? any_box(1.0, 30.0)
+                                     : any_box(1.2, turn % 3 == 0 ? 1.0 : 0.3);
+    grid.move(moved, boxes[moved]);
+    const Box& of = boxes[turn * 7 % count];
+    std::vector<int> expected;
+    for (int i = 0; i < count && std::isfinite(of.low[1]); ++i)
+      if (std::isfinite(boxes[i].low[1]) && meet(boxes[i], of)) expected.push_back(i);
+    EXPECT_EQ(grid.around(of), expected) << turn;
+    all += expected.size();
+  }
+  EXPECT_GT(all, 300u);
+}
+
 TEST(Pairs, AreFoundByAGridAsByLookingAtAll) {
   for (const double size : {0.02, 0.2, 1.5}) {
     std::vector<Box> a, b;
@@ -259,11 +298,6 @@ TEST(Pairs, AreFoundByAGridAsByLookingAtAll) {
         }
         list->push_back(box);
       }
-    const auto meet = [](const Box& p, const Box& q) {
-      for (int d = 0; d < 3; ++d)
-        if (p.high[d] < q.low[d] || q.high[d] < p.low[d]) return false;
-      return true;
-    };
     for (const bool itself : {false, true}) {
       auto found = overlaps(a, b, itself);
       std::sort(found.begin(), found.end());
