@@ -35,6 +35,8 @@ constexpr std::size_t ordinary = alignof(std::max_align_t);
 }  // namespace
 
 void* operator new(std::size_t size) { return counted(size, ordinary); }
+// Sanitizers have one of their own, whose blocks `release` does not know.
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept { return counted(size, ordinary); }
 void* operator new(std::size_t size, std::align_val_t a) { return counted(size, static_cast<std::size_t>(a)); }
 void operator delete(void* p) noexcept { release(p, ordinary); }
 void operator delete(void* p, std::size_t) noexcept { release(p, ordinary); }

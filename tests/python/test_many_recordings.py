@@ -144,6 +144,12 @@ def test_it_tells_and_saves_all_recordings(tmp_path: Path) -> None:
     (tmp_path / "many.json").write_text(json.dumps(data | {"format": "sheetbend many 1"}))
     with pytest.raises(InputError, match=r"format: is not the one.*got 'sheetbend many 1'"):
         sb.ManyFit.load(tmp_path / "many.json")
+    estimate = data["estimates"][0] | {"half_width": -1e-3}
+    (tmp_path / "many.json").write_text(json.dumps(data | {"estimates": [estimate, *data["estimates"][1:]]}))
+    found.save(tmp_path / "other.json")
+    (tmp_path / "many.csv").write_bytes((tmp_path / "other.csv").read_bytes())
+    with pytest.raises(InputError, match=r"estimates\[0\].half_width: must not be negative"):  # no report was to be had
+        sb.ManyFit.load(tmp_path / "many.json")
 
 
 def test_a_fit_that_was_interrupted_goes_on_with_the_same_bits(tmp_path: Path) -> None:

@@ -221,6 +221,15 @@ class TestOutlines:
         with pytest.raises(InputError, match="how many m"):
             textile.read_outline(tmp_path / "shadow.png")
 
+    def test_a_large_picture_is_traced_on_fewer_pixels(self, tmp_path: Path) -> None:
+        """Of 100 million pixels the array alone took 0.8 GB."""
+        image = pytest.importorskip("PIL.Image")
+        pytest.importorskip("contourpy")
+        y, x = np.mgrid[0:4000, 0:6001] - [[[2000]], [[3000]]]
+        image.fromarray(np.where(np.hypot(x, y) < 1500, 60, 200).astype(np.uint8)).save(tmp_path / "shadow.png")
+        outline = textile.read_outline(tmp_path / "shadow.png", width=0.6001)
+        assert outline.area == approx(np.pi * 0.15**2, rel=1e-3)
+
     def test_a_drape_is_a_reading_of_the_state_with_as_many_folds(self) -> None:
         fabric = sb.Fabric(density=0.2, warp=600.0, shear=30.0, bending=3e-5)
         reading = draped([textile.Outline("a", wavy()), textile.Outline("b", wavy(5, 0.129))], PLATES)

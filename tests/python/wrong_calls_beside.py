@@ -1,4 +1,4 @@
-"""More of `wrong_calls.py`: calls of the textile laboratory, of torch, and of figures."""
+"""More of `wrong_calls.py`: calls of the textile laboratory, of torch and JAX, and of figures."""
 
 from __future__ import annotations
 
@@ -41,6 +41,33 @@ def file() -> Path:
 @cache
 def curves() -> tuple[textile.Curve, ...]:
     return textile.read_curves(file(), length=0.2, width=0.05)
+
+
+@cache
+def loop(test: str) -> textile.Curve:
+    """A KES loop of bending or shear, of which 30 % slide."""
+    far, columns = {"bending": (2.5, "K [1/cm];M [gf cm/cm]"), "shear": (8.0, "angle [deg];F [gf/cm]")}[test]
+    there = np.linspace(0.0, 1.0, 41)
+    at = far * np.concatenate([there, there[-2::-1], -there[1:], -there[-2::-1]])
+    slid, load = 0.0, []
+    for x in at:
+        slid = min(max(slid, x - 0.15 * far), x + 0.15 * far)
+        load.append(0.5 * (x - 0.3 * slid))
+    path = Path(mkdtemp()) / f"{test}.csv"
+    path.write_text(f"{columns}\n" + "".join(f"{x:.5f};{y:.6f}\n" for x, y in zip(at, load, strict=True)))
+    return textile.read_curves(path, test=test, length=0.2, width=0.05)[0]
+
+
+@cache
+def outline() -> Path:
+    angle = np.linspace(0.0, 2 * np.pi, 60, endpoint=False)
+    path = Path(mkdtemp()) / "drape.csv"
+    path.write_text("".join(f"{130 * np.cos(a):.3f},{110 * np.sin(a):.3f}\n" for a in angle))
+    return path
+
+
+def sheet() -> sb.TriangleMesh:
+    return sb.mesh.grid(0.1, 0.1, 2, 2)
 
 
 TEXTILE: dict[str, Callable[[], Call]] = {
@@ -118,6 +145,33 @@ TEXTILE: dict[str, Callable[[], Call]] = {
             "cells": 2,
         },
     ),
+    "textile.bending_loop": lambda: (
+        textile.bending_loop,
+        {"curve": loop("bending"), "cycle": 0, "slope": (50.0, 150.0), "at": 100.0},
+    ),
+    "textile.bending_yield": lambda: (textile.bending_yield, {"curve": loop("bending")}),
+    "textile.shear_loop": lambda: (
+        textile.shear_loop,
+        {"curve": loop("shear"), "cycle": 0, "slope": (0.5, 2.5), "at": (0.5, 5.0)},
+    ),
+    "textile.shear_yield": lambda: (textile.shear_yield, {"curve": loop("shear"), "tension": 9.8}),
+    "textile.read_outline": lambda: (textile.read_outline, {"path": outline(), "units": "mm", "width": None}),
+    "textile.strains_under": lambda: (
+        textile.strains_under,
+        {"fabric": fabric(), "curves": curves(), "loads": [5.0, 10.0], "along": "warp", "cells": 2},
+    ),
+    "textile.forecast_pull": lambda: (
+        textile.forecast_pull,
+        {
+            "curves": curves(),
+            "strain": [0.05],
+            "laws": ("exponential", "sinh"),
+            "up_to": None,
+            "way": "loading",
+            "cycle": 0,
+            "seed": 0,
+        },
+    ),
 }
 
 FIGURES: dict[str, Callable[[], Call]] = {
@@ -128,6 +182,26 @@ FIGURES: dict[str, Callable[[], Call]] = {
     "plot.residuals": lambda: (
         sb.plot.residuals,
         {"measured": motion(), "simulated": motion(), "times": TIMES},
+    ),
+    "plot.shapes": lambda: (
+        sb.plot.shapes,
+        {"measured": [motion()[0]], "simulated": [motion()[-1]], "rings": (), "names": ("a",), "plane": (0, 2)},
+    ),
+    "plot.green_strain": lambda: (sb.plot.green_strain, {"mesh": sheet(), "positions": sheet().vertices}),
+    "plot.largest_strain": lambda: (sb.plot.largest_strain, {"mesh": sheet(), "positions": sheet().vertices}),
+    "mesh.write_obj_sequence": lambda: (
+        sb.mesh.write_obj_sequence,
+        {"folder": Path(mkdtemp()), "mesh": sheet(), "positions": sheet().vertices[None]},
+    ),
+    "mesh.write_ply_sequence": lambda: (
+        sb.mesh.write_ply_sequence,
+        {
+            "folder": Path(mkdtemp()),
+            "mesh": sheet(),
+            "positions": sheet().vertices[None],
+            "vertex_fields": None,
+            "face_fields": None,
+        },
     ),
 }
 
@@ -176,4 +250,18 @@ def tensors() -> dict[str, Callable[[], Call]]:
     }
 
 
-BESIDE = {**TEXTILE, **FIGURES, **tensors()}
+def arrays_of_jax() -> dict[str, Callable[[], Call]]:
+    """Calls of JAX; none where it is not installed."""
+    try:
+        import sheetbend.jax as sj
+    except sb.MissingExtraError:
+        return {}
+    given = {"scene": rope(), "times": TIMES, "solver": STEP, "values": {"rope_EI": 1e-3}, "inputs": None}
+    gravity = {"values": None, "inputs": {"gravity": np.array([0.0, 0.0, -9.81])}}
+    return {
+        "jax.simulate": lambda: (sj.simulate, {**given, "nodes": False}),
+        "jax.simulate inputs": lambda: (sj.simulate, {**given, **gravity}),
+    }
+
+
+BESIDE = {**TEXTILE, **FIGURES, **tensors(), **arrays_of_jax()}

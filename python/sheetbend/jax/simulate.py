@@ -11,10 +11,12 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays.checks import check_kind
 from ..errors import InputError, choices
 from ..motion.core_terms import substeps
 from ..motion.rollouts import Rollouts
 from ..motion.solver import Solver
+from ..scene.given import check_scene
 from ..scene.scene import Scene
 from .flat import FlatInputs
 
@@ -48,13 +50,16 @@ def simulate(
         InputError: times off the grid, unknown names, wrong shapes. Values outside their range and motions that diverge
             are found while the program runs; JAX then raises its own error with the package's message.
     """
+    check_scene(scene)
+    for field, given in (("values", values), ("inputs", inputs)):
+        check_kind(field, {} if given is None else given, Mapping, "give a mapping from names, or leave it out")
     solver = Solver.given(solver)
     compiled, steps = scene.compiled, substeps(times, solver.h)
-    given, arrays = _quantities(scene, values or {}), _arrays(scene, inputs or {})
+    named, arrays = _quantities(scene, values or {}), _arrays(scene, inputs or {})
     rollouts = Rollouts(scene, solver.core(compiled), steps, False, solver, replaced=tuple(arrays))
-    flat = FlatInputs(compiled, rollouts, tuple(given), tuple(arrays), nodes)
+    flat = FlatInputs(compiled, rollouts, tuple(named), tuple(arrays), nodes)
     kind = jnp.result_type(float)
-    theta = jnp.stack([jnp.asarray(v, kind) for v in given.values()]) if given else jnp.zeros(0, kind)
+    theta = jnp.stack([jnp.asarray(v, kind) for v in named.values()]) if named else jnp.zeros(0, kind)
     shape = (len(steps), compiled.nodes if nodes else compiled.particles, 3)
     return _function(flat, jax.ShapeDtypeStruct(shape, kind))(theta, [jnp.asarray(a, kind) for a in arrays.values()])
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays.checks import check_kind, finite
+from ..arrays.checks import check_kind, finite, numbers
 from ..errors import MeshError
 from ..files.whole import write_text, written
 from .triangle_mesh import TriangleMesh
@@ -42,7 +42,7 @@ def write_obj_sequence(folder: str | Path, mesh: TriangleMesh, positions: ArrayL
     Raises:
         MeshError: positions of another shape, or the folder holds more frames of an earlier, longer sequence.
     """
-    x = _positions(mesh, positions, (len(np.asarray(positions)),))
+    x = _sequence(mesh, positions)
     files = _frame_files(Path(folder), len(x), ".obj")
     tail = _texture_and_faces(mesh)
     for path, frame in zip(files, x, strict=True):
@@ -121,13 +121,15 @@ def write_ply_sequence(
     Raises:
         MeshError: as `write_ply`, or the folder holds more frames of an earlier, longer sequence.
     """
-    x = _positions(mesh, positions, (len(np.asarray(positions)),))
+    x = _sequence(mesh, positions)
     fields: list[dict[str, Array]] = []
     for kind, given, count in (
         ("vertex_fields", vertex_fields, len(mesh.vertices)),
         ("face_fields", face_fields, len(mesh.triangles)),
     ):
-        fields.append({name: np.asarray(values, dtype=float) for name, values in (given or {}).items()})
+        named = {} if given is None else given
+        check_kind(kind, named, Mapping, "give arrays by name, or leave it out", MeshError)
+        fields.append({name: numbers(f"{kind}[{name!r}]", values, MeshError) for name, values in named.items()})
         for name, values in fields[-1].items():
             if values.shape != (len(x), count):
                 shape = (len(x), count)
@@ -160,6 +162,11 @@ def _positions(mesh: TriangleMesh, positions: ArrayLike | None, frames: tuple[in
     return finite(
         "positions", mesh.vertices if positions is None else positions, (*frames, *mesh.vertices.shape), MeshError
     )
+
+
+def _sequence(mesh: TriangleMesh, positions: ArrayLike) -> Array:
+    frames = finite("positions", positions, None, MeshError)
+    return _positions(mesh, frames, frames.shape[:1])
 
 
 def _fields(name: str, fields: Mapping[str, ArrayLike] | None, count: int, taken: tuple[str, ...]) -> dict[str, Array]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import numbers
+from ..arrays.checks import is_list, numbers, some_indices
 from ..arrays.timeseries import Array
 from ..doubts.prediction import Comparison
 from ..errors import InputError
@@ -164,6 +164,17 @@ def plot_motions(
     return np.array(panels)
 
 
+def _places(field: str, shapes: Sequence[Array]) -> list[Array]:
+    """Shapes of points (points, 3) m each."""
+    if not is_list(shapes):
+        raise InputError(field, "must be a list of shapes", shapes, "give (points, 3) m of each")
+    found = [numbers(f"{field}[{k}]", shape, InputError) for k, shape in enumerate(shapes)]
+    for k, shape in enumerate(found):
+        if shape.ndim != 2 or shape.shape[1] != 3:
+            raise InputError(f"{field}[{k}]", "has the wrong shape", shape.shape, "give (points, 3) m")
+    return found
+
+
 def plot_shapes(
     measured: Sequence[Array],
     simulated: Sequence[Array],
@@ -191,12 +202,18 @@ def plot_shapes(
     Raises:
         InputError: no shapes, measured ones that are not as many as simulated ones, or another number of axes.
     """
+    measured, simulated = _places("measured", measured), _places("simulated", simulated)
+    rings, across = _places("rings", rings), [*some_indices("plane", plane, 3)] if is_list(plane) else []
+    if len(across) != 2:
+        raise InputError("plane", "must be two axes", plane, "give two of 0, 1 and 2")
+    if not is_list(names) or not all(isinstance(name, str) for name in names):
+        raise InputError("names", "must be texts", names, "give a name for each shape, or leave them out")
     if not measured or len(measured) != len(simulated):
         got = (len(measured), len(simulated))
         raise InputError("measured", "must hold one shape per simulated one, at least one", got, "pair them up")
     columns = min(3, len(measured))
     rows = -(-len(measured) // columns)
-    width, height = np.ptp(seen_points(np.vstack([*measured, *simulated])[:, plane]), axis=0)
+    width, height = np.ptp(seen_points(np.vstack([*measured, *simulated])[:, across]), axis=0)
     cell = 7.6 / columns
     ratio = min(max(height / max(width, 1e-9), 0.2), 1.5)
     size = (7.6, 0.75 + rows * ((cell - 0.35) * ratio + 0.3))
@@ -207,17 +224,17 @@ def plot_shapes(
     labels = list(names) or [f"shape {index}" for index in range(len(measured))]
     for panel, points, line, label in zip(panels, measured, simulated, labels, strict=False):
         clean(panel)
-        panel.plot(*(1e3 * points[:, plane]).T, "o", color=GRAY, markersize=3.2, markeredgewidth=0)
-        panel.plot(*(1e3 * line[:, plane]).T, color=ACCENT, linewidth=1.4)
+        panel.plot(*(1e3 * points[:, across]).T, "o", color=GRAY, markersize=3.2, markeredgewidth=0)
+        panel.plot(*(1e3 * line[:, across]).T, color=ACCENT, linewidth=1.4)
         panel.set_title(label, fontsize=9, color=INK, loc="left", pad=4)
         panel.set_aspect("equal", adjustable="box")
     for panel, ring in zip(panels, rings, strict=False):
-        panel.plot(*(1e3 * ring[:, plane]).T, "o", color=ACCENT, markersize=7, markerfacecolor="none")
+        panel.plot(*(1e3 * ring[:, across]).T, "o", color=ACCENT, markersize=7, markerfacecolor="none")
     for index, panel in enumerate(panels[: len(measured)]):
         if index % columns == 0:
-            panel.set_ylabel(f"{_AXES[plane[1]]} [mm]")
+            panel.set_ylabel(f"{_AXES[across[1]]} [mm]")
         if index + columns >= len(measured):
-            panel.set_xlabel(f"{_AXES[plane[0]]} [mm]")
+            panel.set_xlabel(f"{_AXES[across[0]]} [mm]")
             panel.tick_params(labelbottom=True)
     key(whole, [("measured", GRAY), ("simulated", ACCENT)])
     return np.array(panels[: len(measured)])

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import finite
+from ..arrays.checks import check_kind, finite
 from ..errors import SceneError
 from ..mesh import TriangleMesh
 from ..motion.values import elastic_energy
@@ -24,6 +24,7 @@ def green_strain(mesh: TriangleMesh, positions: ArrayLike) -> Array:
     Raises:
         SceneError: positions of another shape.
     """
+    check_kind("mesh", mesh, TriangleMesh, "give such as sb.mesh.grid(width, height, nx, ny)", SceneError)
     x = finite("positions", positions, mesh.vertices.shape, SceneError)[mesh.triangles]
     sides, flat = x[:, 1:] - x[:, :1], mesh.corners[:, 1:] - mesh.corners[:, :1]
     F = np.linalg.solve(flat, sides)  # rows: where a meter along u and along v has gone

@@ -14,7 +14,7 @@ from ..files.door import reading
 from ..files.json_file import json_content
 from ..files.typed import as_dataclass, listed, mapping
 from ..files.whole import write_text
-from ..result.estimate import Estimate
+from ..result.estimate import Estimate, check_widths
 from ..result.motions import RecordingFit
 from ..result.result import FitData
 from .report import plain
@@ -101,12 +101,9 @@ def _estimate(name: str, part: object) -> Estimate:
     if len(ends) != 2:
         raise InputError(f"{where}.interval", "must be [lower, upper]", ends, "give both, null where open")
     rest = {key: value for key, value in told.items() if key != "interval"}
-    found = as_dataclass(Estimate, {"name": name, "lower": ends[0], "upper": ends[1], **rest}, where)
-    for part_of in ("half_width", "statistical", "driven", "discretization", "systematic", "in_all"):
-        width = getattr(found, part_of)
-        if width is not None and width < 0:
-            raise InputError(f"{where}.{part_of}", "must not be negative", width, "give a half-width")
-    return found
+    return check_widths(
+        as_dataclass(Estimate, {"name": name, "lower": ends[0], "upper": ends[1], **rest}, where), where
+    )
 
 
 def _recording(name: str, part: object) -> RecordingFit:

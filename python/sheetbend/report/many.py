@@ -18,7 +18,7 @@ from ..files.json_file import json_content
 from ..files.typed import as_dataclass, as_type, mapping
 from ..files.whole import write_text
 from ..quantities.wording import short
-from ..result.estimate import Estimate, estimate_of
+from ..result.estimate import Estimate, check_widths, estimate_of
 from ..statistics.intervals import NORMAL
 from .report import estimate_row
 from .tables import Section, plain_section
@@ -154,7 +154,10 @@ class ManyFit:
             OwnParameter(p.name, p.unit, p.log, tuple(columns[2 * k]), tuple(columns[2 * k + 1]))
             for k, p in enumerate(own)
         ]
-        return as_dataclass(cls, data, "")
+        found = as_dataclass(cls, data, "")
+        for i, estimate in enumerate(found.estimates):
+            check_widths(estimate, f"estimates[{i}]")
+        return found
 
     def _sections(self) -> list[Section]:
         shared = []

@@ -60,6 +60,19 @@ class Estimate:
             raise InputError(f"{self.name}.verdict", "is unknown", self.verdict, f"use one of: {', '.join(VERDICTS)}")
 
 
+def check_widths(estimate: Estimate, where: str) -> Estimate:
+    """The estimate, as a file has it: half-widths must not be negative.
+
+    Args:
+        where: its path in the file.
+    """
+    for part in ("half_width", "statistical", "driven", "discretization", "systematic", "in_all"):
+        width = getattr(estimate, part)
+        if width is not None and width < 0:
+            raise InputError(f"{where}.{part}", "must not be negative", width, "give a half-width")
+    return estimate
+
+
 def estimate_of(estimates: Sequence[Estimate], name: str) -> Estimate:
     """The estimate of that name; KeyError names the ones there are."""
     for estimate in estimates:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import finite
+from ..arrays.checks import check_count, finite, is_list, is_number
 from ..arrays.timeseries import Array
 from ..errors import InputError
 from ..quantities.wording import short
@@ -114,11 +115,16 @@ def forecast_pull(
         MissingExtraError: scipy is not installed.
     """
     checked_pulls(curves)
+    check_count("seed", seed, 0, sys.maxsize, InputError)
+    if not is_list(laws) or not all(isinstance(law, str) for law in laws):
+        raise InputError("laws", "must be a list of names", laws, f"use names of: {', '.join(STRIP_LAWS)}")
+    if up_to is not None and not is_number(up_to):
+        raise InputError("up_to", "must be a strain", up_to, "give the largest strain to fit, or leave it out")
     found = weigh(Levels.of(curves, way, cycle, up_to), laws, seed)
     reach = found.levels.reach
-    at = np.linspace(1.0, CHECKED, _POINTS) * reach if strain is None else np.atleast_1d(strain)
-    at = finite("strain", at, (np.size(at),), InputError)
-    if not (at > 0.0).all():
+    at = np.linspace(1.0, CHECKED, _POINTS) * reach if strain is None else finite("strain", strain, None, InputError)
+    at = np.atleast_1d(at)
+    if at.ndim != 1 or not (at > 0.0).all():
         raise InputError("strain", "must be positive", at.tolist(), "forecast loads of strains above zero")
     lower, middle, upper = np.exp(np.quantile(_drawn(found, at, seed), _QUANTILES, axis=0, method="inverted_cdf"))
     return PullForecast(at, middle, lower, upper, reach, found.shares, found.levels.scatter, found.wander)

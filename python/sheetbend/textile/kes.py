@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays.checks import check_kind
+from ..arrays.checks import check_count, check_kind, finite
 from ..errors import InputError
 from .curve import Curve, Cycle, chosen
 from .reading import GRAM_FORCE, Reading
@@ -106,8 +106,8 @@ def shear_loop(
     """
     check_test(curve, "shear")
     sides = _sides(curve, cycle)
-    low, high = (math.radians(a) for a in slope)
-    near, far = (_width(sides, math.radians(a)) for a in at)
+    low, high = (math.radians(a) for a in finite("slope", slope, (2,), InputError))
+    near, far = (_width(sides, math.radians(a)) for a in finite("at", at, (2,), InputError))
     return ShearLoop(
         Reading(_mean(sides, lambda c: _slope(c, low, high)), "N/m", {}, "gf/(cm deg)", math.radians(_GF_PER_CM)),
         None if near is None else Reading(near, "N/m", {}, "gf/cm", _GF_PER_CM),
@@ -132,9 +132,10 @@ def bending_loop(
     """
     check_test(curve, "bending")
     sides = _sides(curve, cycle)
-    width = _width(sides, at)
+    low, high = finite("slope", slope, (2,), InputError).tolist()
+    width = _width(sides, float(finite("at", at, (), InputError)))
     return BendingLoop(
-        Reading(_mean(sides, lambda c: _slope(c, *slope)), "N m", {}, "gf cm^2/cm", 100.0 / GRAM_FORCE),
+        Reading(_mean(sides, lambda c: _slope(c, low, high)), "N m", {}, "gf cm^2/cm", 100.0 / GRAM_FORCE),
         None if width is None else Reading(width, "N", {}, "gf cm/cm", 1.0 / GRAM_FORCE),
         _lost(sides),
     )
@@ -153,6 +154,7 @@ def check_test(curve: Curve, test: str) -> None:
 
 def _sides(curve: Curve, cycle: int) -> list[Cycle]:
     """The chosen cycle of each side to which the test goes, the positive side first."""
+    check_count("cycle", cycle, -len(curve.cycles()), len(curve.cycles()), InputError)
     found = []
     for sign in (1.0, -1.0):
         own = [c for c in curve.cycles() if sign * float(c.loading.deformation[-1]) > 0.0]

@@ -17,7 +17,7 @@ from ..files.units import METERS
 from ..optional import require
 
 PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
-_LARGEST, _MOST_PIXELS = 2**24, 10**8
+_LARGEST, _MOST_PIXELS, _KEPT = 2**24, 10**8, 2**24  # bytes of a table, pixels that are read, and traced
 _RAYS, _MOST_FOLDS = 720, 36
 _LEVELS = 256  # of gray
 
@@ -124,7 +124,9 @@ def _contour(path: Path, width: float) -> Array:
     with images.open(path) as picture:
         if picture.size[0] * picture.size[1] > _MOST_PIXELS:
             raise RecordingError(path.name, "is too large", picture.size, f"give at most {_MOST_PIXELS} pixels")
-        gray = np.asarray(picture.convert("L"), dtype=float)
+        pixels = math.ceil(math.sqrt(picture.size[0] * picture.size[1] / _KEPT))  # along either axis, to one
+        gray = np.asarray(picture.convert("L").reduce(pixels), dtype=float)
+        scale = width * pixels / picture.size[0]
     level = _threshold(gray)
     if np.median(np.concatenate([gray[0], gray[-1], gray[:, 0], gray[:, -1]])) > level:
         gray, level = -gray, -level  # a dark shadow
@@ -134,7 +136,7 @@ def _contour(path: Path, width: float) -> Array:
         fix = "give a picture that shows all of the shadow, darker or brighter than what is around it"
         raise RecordingError(path.name, "shows no closed outline", f"{len(lines)} open lines", fix)
     longest = max(closed, key=lambda line: Outline(path.stem, line[:-1]).area)
-    return np.asarray(longest[:-1] * [1.0, -1.0] * width / gray.shape[1])
+    return np.asarray(longest[:-1] * [1.0, -1.0] * scale)
 
 
 def _threshold(gray: Array) -> float:

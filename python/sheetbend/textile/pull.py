@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import check_count, is_list, is_number
+from ..arrays.checks import check_count, finite, is_list, is_number
 from ..errors import InputError
 from ..minimum.linear_algebra import one_blas_thread
 from ..objects.fabric import Fabric
@@ -196,7 +196,9 @@ def strains_under(
     """
     checked_pulls(curves)
     length, width = _specimen(curves)
-    beyond = np.atleast_1d(np.asarray(loads, dtype=float)) - curves[0].pretension
+    beyond = np.atleast_1d(finite("loads", loads, None, InputError)) - curves[0].pretension
+    if beyond.ndim != 1:
+        raise InputError("loads", "must be a list of numbers", beyond.shape, "give N/m, one after the other")
     return np.array([_test(along, float(load), width, length, cells)(fabric).value for load in beyond])
 
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays.checks import is_number
+from ..errors import InputError
 from ..result.estimate import Estimate
 from .curve import Curve
 from .kes import check_test
@@ -58,6 +60,8 @@ def shear_yield(curve: Curve, *, tension: float = 1e3 * GRAM_FORCE) -> ShearYiel
         MissingExtraError: scipy is not installed.
     """
     check_test(curve, "shear")
+    if not (is_number(tension) and tension >= 0.0):
+        raise InputError("tension", "must not be negative", tension, "give N/m, 0 for none")
     names, units = ("shear", "yield_shear_share", "yield_shear"), ("N/m", "N/m", "")
     found = fit_sliding(curve, np.tan(curve.deformation), names, units, tension)
     height = 2.0 * found.share.value * found.stiffness.value * found.distance.value
