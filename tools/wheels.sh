@@ -29,7 +29,7 @@ say "tools in build/wheel-tools"
 if [[ -n ${1:-} ]]; then
   wheel=$1
 else
-  say "building, in some seven minutes on two cores"
+  say "building, in some five minutes on two cores"
   rm -rf "$BUILT"
   python3 -m pip wheel . --no-deps --wheel-dir "$BUILT" \
     --config-settings=cmake.define.SHEETBEND_KERNELS=all --config-settings=cmake.define.SHEETBEND_CERES=OFF \
