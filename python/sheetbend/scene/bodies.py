@@ -134,7 +134,8 @@ def _declare(scene: SceneData, names: Mapping[str, Sequence[str]], values: Mappi
 
 def driven_start(scene: SceneData, start: Start, frame: HasCorrection | None) -> FrameState:
     """The state of a frame at the start, as the frame of its poses corrects it."""
-    shown = FrameState(*(expressions(v) for v in (start.at, start.frame, start.velocity, start.spin)))
+    at, axes, velocity, spin = (expressions(v) for v in (start.at, start.frame, start.velocity, start.spin))
+    shown = FrameState(at, axes, velocity, spin)
     return shown if frame is None else frame.corrected_start(scene, shown)
 
 
