@@ -8,6 +8,7 @@ import numpy as np
 
 from ..arrays import timeseries
 from ..arrays.timeseries import Array
+from .exchanged import put_back_neighbors
 from .leaps import SUDDEN, elsewhere, least_leap
 
 BEFORE = 5  # frames from which the place of a marker is extrapolated
@@ -37,6 +38,8 @@ def relabeled(t: Array, positions: Array, names: Sequence[str]) -> tuple[Array, 
     if len(t) < FEWEST:
         return positions, []
     x, said = put_back(t, positions, names)
+    x, exchanged = put_back_neighbors(t, x, names)
+    said += exchanged
     near, far = np.nanquantile(x, [0.01, 0.99], axis=(0, 1))  # reflections may be far away
     extent = float(np.linalg.norm(far - near))
     least = least_leap(t, extent)

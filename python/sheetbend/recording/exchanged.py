@@ -1,0 +1,90 @@
+"""Labels that two neighbors on a line or a sheet exchange, told by the distances to their other neighbors.
+
+Where frames are far apart in time, markers go farther from one frame to the next than they are from each other, and no
+extrapolation tells an exchange (`relabeled`). But a marker on a rope or a cloth is never much farther from its
+neighbors than the material between them is long. So of two labelings of a pair, a frame costs as much as distances are
+too long in it, and a change from one labeling to the other as much as it makes the markers jump: the cheapest path
+through all frames (Viterbi) says when the two have each other's label.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..arrays.shortest_tree import tree
+from ..arrays.timeseries import Array
+
+FEWEST, MANY = 20, 300  # frames at least, and those that tell distances
+TOO_LONG = 1.25  # times its median: a distance between neighbors that material allows at most
+JUMP = 0.1  # weight of a jump, squared over the distance between neighbors
+CHANGE = 0.3  # of a path, for each change
+GAIN = 1.5  # by which a path with changes is at least cheaper: three frames with one distance twice as long
+LEFT = 0.25  # of the cost of these frames, at most, that the exchange leaves
+
+
+def put_back_neighbors(t: Array, positions: Array, names: Sequence[str]) -> tuple[Array, list[str]]:
+    """Positions (frames, markers, 3) m, and a sentence on each piece of time in which two neighbors had each other's
+    label."""
+    count = positions.shape[1]
+    if len(t) < FEWEST or count < 4:
+        return positions, []
+    x, said = positions.copy(), list[str]()
+    some = x[:: max(1, len(x) // MANY)]
+    distance = np.linalg.norm(some[:, :, None] - some[:, None], axis=3)
+    if not np.isfinite(distance).any(axis=0).all():
+        return positions, []
+    apart = np.nanmedian(distance, axis=0)
+    if not apart[~np.eye(count, dtype=bool)].all():
+        return positions, []
+    joined, _ = tree(apart, tuple(range(count)))
+    for a in range(count):
+        for b in sorted(k for k in joined[a] if k > a):
+            beside = [(a, k) for k in joined[a] - {b}] + [(b, k) for k in joined[b] - {a}]
+            for first, last in _pieces(x, a, b, beside, apart):
+                x[first : last + 1, [a, b]] = x[first : last + 1, [b, a]]
+                said.append(
+                    f"{names[a]} and {names[b]} have each other's label from {t[first]:.4g} to {t[last]:.4g} s, or "
+                    "their distances to their neighbors would be far too long: put back"
+                )
+    return x, said
+
+
+def _pieces(x: Array, a: int, b: int, beside: list[tuple[int, int]], apart: Array) -> list[tuple[int, int]]:
+    """First and last frames of the pieces in which markers a and b have each other's label."""
+    cost = np.zeros((2, len(x)))
+    for k, other in beside:
+        for labeling, own in enumerate((k, b if k == a else a)):
+            off = np.linalg.norm(x[:, own] - x[:, other], axis=1) / apart[k, other]
+            cost[labeling] += np.nan_to_num(np.maximum(off - TOO_LONG, 0.0) ** 2)
+    if (cost[0] > cost[1]).sum() < 2:
+        return []
+    size = apart[a, b] ** 2
+    same, crossed = np.zeros(len(x)), np.zeros(len(x))
+    seen: dict[int, Array] = {}
+    for f in range(len(x)):
+        now = {k: x[f, k] for k in (a, b) if np.isfinite(x[f, k, 0])}
+        for k, place in now.items():
+            other = b if k == a else a
+            if k in seen and other in seen:
+                same[f] += JUMP * float(np.sum((place - seen[k]) ** 2)) / size
+                crossed[f] += JUMP * float(np.sum((place - seen[other]) ** 2)) / size
+        seen |= now
+    best, came = np.array([cost[0, 0], cost[1, 0] + CHANGE]), np.zeros((len(x), 2), int)
+    for f in range(1, len(x)):
+        stay, change = best + same[f], best[::-1] + crossed[f] + CHANGE
+        came[f] = np.where(stay <= change, [0, 1], [1, 0])
+        best = np.minimum(stay, change) + cost[:, f]
+    state = np.zeros(len(x), int)
+    state[-1] = int(best[1] < best[0])
+    for f in range(len(x) - 1, 0, -1):
+        state[f - 1] = came[f, state[f]]
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], state, [0]])))
+    pieces = [(int(i), int(j) - 1) for i, j in zip(edges[::2], edges[1::2], strict=True)]
+    return [
+        (i, j)
+        for i, j in pieces
+        if (before := cost[0, i : j + 1].sum()) - cost[1, i : j + 1].sum() > GAIN
+        and cost[1, i : j + 1].sum() < LEFT * before
+    ]
