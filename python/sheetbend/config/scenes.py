@@ -40,7 +40,7 @@ def build_scene(
     section: schema.SceneSection,
     moment: Moment | None,
     placed: Mapping[str, Seats],
-    finer: int = 1,
+    finer: int,
     ropes: Sequence[str] | None = None,
     folder: Path = Path(),
     tools: Mapping[str, Tool] | None = None,

@@ -13,7 +13,7 @@ MOST_FRAMES = 200  # of a recording, that its order is judged by
 SHORTER, STEADIER = 0.8, 0.85  # of two links' lengths and of how much these vary: links that are taken instead
 
 
-def check_order(recording: Recording, inner: tuple[int, int], usual: Array | None = None) -> None:
+def check_order(recording: Recording, inner: tuple[int, int], usual: Array | None) -> None:
     """Refuse markers out of order along the rope, in time wherever the rope bends.
 
     Args:

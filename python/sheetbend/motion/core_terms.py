@@ -99,14 +99,11 @@ def divergence(scene: Scene) -> Iterator[None]:
         raise UnconvergedError(error.iterations, error.residual, scene.name) from error
 
 
-def over_all_nodes(
-    field: str, bar: np.ndarray, shape: tuple[int, ...], particles: int, error: type[InputError]
-) -> np.ndarray:
-    """A derivative with respect to the positions of all nodes; zero for hidden nodes where it was given for the
-    particles alone.
+def over_all_nodes(bar: np.ndarray, shape: tuple[int, ...], particles: int, error: type[InputError]) -> np.ndarray:
+    """The derivative `positions_bar` with respect to the positions of all nodes; zero for hidden nodes where it was
+    given for the particles alone.
 
     Args:
-        field: the argument that errors name.
         bar: (..., nodes, 3) or (..., particles, 3).
         shape: (..., nodes, 3).
         particles: their number.
@@ -117,9 +114,9 @@ def over_all_nodes(
     """
     own = (*shape[:-2], particles, 3)
     if bar.shape == shape:
-        return finite(field, bar, shape, error) if not np.isfinite(bar).all() else bar
+        return finite("positions_bar", bar, shape, error) if not np.isfinite(bar).all() else bar
     padded = np.zeros(shape)
-    padded[..., :particles, :] = finite(field, bar, own, error)
+    padded[..., :particles, :] = finite("positions_bar", bar, own, error)
     return padded
 
 

@@ -111,7 +111,6 @@ class Equilibrium:
             None
             if positions_bar is None
             else over_all_nodes(
-                "positions_bar",
                 numbers("positions_bar", positions_bar, SceneError),
                 self.nodes.shape,
                 self.scene.particle_count,

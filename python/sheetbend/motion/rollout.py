@@ -108,7 +108,7 @@ class Rollout:
             UnconvergedError: as `rollout`.
         """
         bar = numbers("positions_bar", positions_bar, InputError)
-        bar = over_all_nodes("positions_bar", bar, self.nodes.shape, self._compiled.particles, InputError)
+        bar = over_all_nodes(bar, self.nodes.shape, self._compiled.particles, InputError)
         with divergence(self._scene):
             inputs_bar, recomputed = self._core.reverse(self._inputs, self._tape, self._steps, bar, 0.0)
         by_quantity = self._compiled.theta_bar(self._theta, inputs_bar)

@@ -45,7 +45,7 @@ def add_joints(
     damping: TimeConstant | None,
     normal: Array | None,
     modes: Sequence[int],
-    softness_modes: Sequence[int] = (),
+    softness_modes: Sequence[int],
 ) -> StiffnessField | None:
     """Let a rope bend at its inner nodes and clamped ends; alpha = Voronoi length / EI.
 
