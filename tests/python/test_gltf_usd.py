@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sheetbend as sb
+from scipy.spatial.transform import Rotation
 from sheetbend.cli.app import app
 from sheetbend.pictures.gltf import MOST_FRAMES, write_gltf
 from sheetbend.pictures.moving_shapes import tube
@@ -80,6 +81,24 @@ class TestGltf:
         q, v = np.array([x, y, z]), np.array([0.0, 0.0, 1.0])
         turned = v + 2 * np.cross(q, np.cross(q, v) + w * v)
         np.testing.assert_allclose(turned, [0, 1, 0], atol=1e-12)
+
+    @pytest.mark.parametrize("axis", [0, 1, 2])
+    @pytest.mark.parametrize("sign", [1.0, -1.0])
+    def test_what_is_up_in_the_scene_is_up_in_the_file(self, axis: int, sign: float, tmp_path: Path) -> None:
+        """A garment from an OBJ file, y up, lay on its side."""
+        up = sign * np.eye(3)[axis]
+        scene = sb.Scene(gravity=-9.81 * up)
+        scene.pin(sb.add_rope(scene, length=0.3, segments=6, density=0.05, EI=1e-3).particles[:1])
+        motion = sb.simulate(scene, [0.0, 0.1], sb.Solver(h=1 / 200))
+        write_gltf(tmp_path / "m.glb", scene, motion)
+        turn = Rotation.from_quat(Glb(tmp_path / "m.glb").json["nodes"][0]["rotation"])
+        np.testing.assert_allclose(turn.apply(up), [0.0, 1.0, 0.0], atol=1e-12)
+        usd, geometry = pytest.importorskip("pxr.Usd"), pytest.importorskip("pxr.UsdGeom")
+        write_usd(tmp_path / "m.usda", scene, motion)
+        stage = usd.Stage.Open(str(tmp_path / "m.usda"))
+        turned = geometry.Xformable(stage.GetDefaultPrim()).GetLocalTransformation().TransformDir(tuple(up))
+        upward = {"Y": [0.0, 1.0, 0.0], "Z": [0.0, 0.0, 1.0]}[geometry.GetStageUpAxis(stage)]
+        np.testing.assert_allclose(turned, upward, atol=1e-6)
 
     def test_another_reader_takes_it(self, scene: sb.Scene, motion: sb.Trajectory, tmp_path: Path) -> None:
         trimesh = pytest.importorskip("trimesh")

@@ -14,7 +14,7 @@ from ..files.whole import written
 from ..motion.simulate import Trajectory
 from ..scene.scene import Scene
 from ..version import __version__
-from .moving_shapes import Array, MovingShape, chosen_frames, moving_shapes, tube
+from .moving_shapes import Array, MovingShape, chosen_frames, moving_shapes, tube, turn_between, up_of
 
 MOST_FRAMES = 240
 """Each frame is a morph target, of which some programs take no more than a few hundred."""
@@ -29,7 +29,7 @@ def write_gltf(path: str | Path, scene: Scene, motion: Trajectory, *, radius: fl
     """Write the cloths and ropes of a motion as a .glb file.
 
     Each frame is a morph target, and an animation goes from one to the next at the motion's own times. Texture
-    coordinates are the material's, in m. glTF has y up: the root node turns z up.
+    coordinates are the material's, in m. glTF has y up: the root node turns the scene's axis that points up there.
 
     Args:
         path: of the file, with the suffix .glb.
@@ -47,7 +47,7 @@ def write_gltf(path: str | Path, scene: Scene, motion: Trajectory, *, radius: fl
     if path.suffix.lower() != ".glb":
         raise InputError("path", "is no binary glTF file", str(path), "give a name that ends in .glb")
     frames = chosen_frames(motion.times, MOST_FRAMES)
-    file = _File()
+    file = _File(turn_between(up_of(scene), np.array([0.0, 1.0, 0.0])))
     times = file.accessor(motion.times[frames].astype("<f4"), "SCALAR", bounds=True) if len(frames) > 1 else None
     for shape in moving_shapes(scene, motion, frames):
         file.add(shape, times, radius)
@@ -57,14 +57,14 @@ def write_gltf(path: str | Path, scene: Scene, motion: Trajectory, *, radius: fl
 
 
 class _File:
-    """The parts of a glTF file as they are put together."""
+    """The parts of a glTF file as they are put together; `turn` is the rotation (x, y, z, w) of the root node."""
 
-    def __init__(self) -> None:
+    def __init__(self, turn: list[float]) -> None:
         self._binary = bytearray()
         self._views: list[dict[str, Any]] = []
         self._accessors: list[dict[str, Any]] = []
         self._meshes: list[dict[str, Any]] = []
-        self._nodes: list[dict[str, Any]] = [{"name": "z up", "rotation": [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]}]
+        self._nodes: list[dict[str, Any]] = [{"name": "y up", "rotation": turn}]
         self._channels: list[dict[str, Any]] = []
         self._samplers: list[dict[str, Any]] = []
 

@@ -93,3 +93,21 @@ def _perpendicular(vector: Array, along: Array) -> Array:
     """(n, 3) unit vectors: what vectors have across unit vectors."""
     across = vector - (vector * along).sum(axis=1, keepdims=True) * along
     return np.asarray(across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny))
+
+
+def up_of(scene: Scene) -> Array:
+    """(3,) the coordinate axis that points up, the nearest to against gravity; z without gravity."""
+    g = np.asarray(scene.gravity, dtype=float)
+    axis = int(np.abs(g).argmax()) if g.any() else 2
+    up = np.zeros(3)
+    up[axis] = 1.0 if g[axis] <= 0.0 else -1.0
+    return up
+
+
+def turn_between(start: Array, end: Array) -> list[float]:
+    """The quaternion (x, y, z, w) that turns a coordinate axis into another one, or into its opposite."""
+    along = float(start @ end)
+    if along < 0.0:
+        return [1.0, 0.0, 0.0, 0.0] if not start[0] else [0.0, 0.0, 1.0, 0.0]
+    q = np.array([*np.cross(start, end), 1.0 + along])
+    return [float(part) for part in q / np.linalg.norm(q)]

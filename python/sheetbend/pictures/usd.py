@@ -14,7 +14,7 @@ from ..motion.simulate import Trajectory
 from ..optional import require
 from ..scene.scene import Scene
 from ..version import __version__
-from .moving_shapes import Array, MovingShape, moving_shapes
+from .moving_shapes import Array, MovingShape, moving_shapes, turn_between, up_of
 
 SUFFIXES = (".usd", ".usda", ".usdc")
 
@@ -24,8 +24,8 @@ def write_usd(path: str | Path, scene: Scene, motion: Trajectory, *, radius: flo
 
     A cloth is a mesh with points, velocities, texture coordinates (`primvars:st`, the material's, in m) and the largest
     strain of each triangle (`primvars:strain`). A rope is a linear curve with points, velocities and a width. The stage
-    is in meters, z up, and its time codes are seconds times `timeCodesPerSecond`. The scene's quantities are attributes
-    of the root prim, as `sheetbend:NAME`.
+    is in meters, with y or z up as in the scene (a scene with another axis up is turned), and its time codes are
+    seconds times `timeCodesPerSecond`. The scene's quantities are attributes of the root prim, as `sheetbend:NAME`.
 
     Args:
         path: of the file: .usd and .usdc are binary, .usda is text.
@@ -43,7 +43,7 @@ def write_usd(path: str | Path, scene: Scene, motion: Trajectory, *, radius: flo
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
         raise InputError("path", "is no USD file", str(path), f"give a name that ends in {', '.join(SUFFIXES)}")
-    pxr = {name: require(f"pxr.{name}", "usd") for name in ("Usd", "UsdGeom", "Sdf", "Vt")}
+    pxr = {name: require(f"pxr.{name}", "usd") for name in ("Usd", "UsdGeom", "Sdf", "Vt", "Gf")}
     with written(path) as beside:
         file = beside.with_name(beside.name + path.suffix)  # USD chooses the format by the suffix
         try:
@@ -57,7 +57,8 @@ def write_usd(path: str | Path, scene: Scene, motion: Trajectory, *, radius: flo
 def _write(pxr: dict[str, Any], file: Path, scene: Scene, motion: Trajectory, radius: float | None) -> None:
     usd, geometry, sdf = pxr["Usd"], pxr["UsdGeom"], pxr["Sdf"]
     stage = usd.Stage.CreateNew(str(file))
-    geometry.SetStageUpAxis(stage, geometry.Tokens.z)
+    up = up_of(scene)
+    geometry.SetStageUpAxis(stage, geometry.Tokens.y if up[1] > 0.0 else geometry.Tokens.z)
     geometry.SetStageMetersPerUnit(stage, 1.0)
     rate = _rate(motion.times)
     stage.SetTimeCodesPerSecond(rate)
@@ -67,6 +68,9 @@ def _write(pxr: dict[str, Any], file: Path, scene: Scene, motion: Trajectory, ra
     stage.SetMetadata("comment", f"written by sheetbend {__version__}")
     root = geometry.Xform.Define(stage, f"/{_identifier(scene.name)}")
     stage.SetDefaultPrim(root.GetPrim())
+    if up[1] <= 0.0 and up[2] <= 0.0:
+        x, y, z, w = turn_between(up, np.array([0.0, 0.0, 1.0]))
+        root.AddOrientOp().Set(pxr["Gf"].Quatf(w, x, y, z))
     for name, quantity in scene.quantities.items():
         attribute = root.GetPrim().CreateAttribute(f"sheetbend:{_identifier(name)}", sdf.ValueTypeNames.Double)
         attribute.Set(float(quantity.value))
