@@ -49,7 +49,7 @@ def loop(test: str) -> textile.Curve:
     far, columns = {"bending": (2.5, "K [1/cm];M [gf cm/cm]"), "shear": (8.0, "angle [deg];F [gf/cm]")}[test]
     there = np.linspace(0.0, 1.0, 41)
     at = far * np.concatenate([there, there[-2::-1], -there[1:], -there[-2::-1]])
-    slid, load = 0.0, []
+    slid, load = 0.0, list[float]()
     for x in at:
         slid = min(max(slid, x - 0.15 * far), x + 0.15 * far)
         load.append(0.5 * (x - 0.3 * slid))
