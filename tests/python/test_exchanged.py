@@ -51,3 +51,19 @@ def test_a_slack_rope_that_is_pulled_straight_is_right() -> None:
     links = LINK * np.stack([np.cos(ways), np.sin(ways), 0.0 * ways], axis=2)
     x = np.concatenate([np.zeros((len(t), 1, 3)), np.cumsum(links, axis=1)], axis=1)
     assert put_back_neighbors(t, x, [f"c{k}" for k in range(7)])[1] == []
+
+
+@pytest.mark.parametrize("unfolds", [False, True])
+@pytest.mark.parametrize("lost", [0.0, 0.1])
+def test_a_cloth_that_is_folded_most_of_the_time_is_right(unfolds: bool, lost: float) -> None:
+    """Markers of the two layers are nearest neighbors then, and far apart where the cloth is flat: two pairs of columns
+    were exchanged there."""
+    rng, t = np.random.default_rng(0), np.arange(151) / RATE
+    folded = 1.0 - np.clip(t - 3.5, 0.0, 1.0) if unfolds else np.clip(t - 1.0, 0.0, 1.0)
+    column, row = (LINK * k.ravel() for k in np.meshgrid(np.arange(5.0), np.arange(4.0)))
+    beyond, angle = np.maximum(column - 2.0 * LINK, 0.0), (np.pi - 0.2) * folded[:, None]
+    x = np.minimum(column, 2.0 * LINK) + beyond * np.cos(angle)
+    x = np.stack([x, np.broadcast_to(row, x.shape), beyond * np.sin(angle)], axis=2)
+    x += rng.normal(0.0, 1e-3, x.shape)
+    x[rng.random(x.shape[:2]) < lost] = np.nan
+    assert put_back_neighbors(t, x, [f"c{k}" for k in range(20)])[1] == []

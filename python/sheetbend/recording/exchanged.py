@@ -4,7 +4,9 @@ Where frames are far apart in time, markers go farther from one frame to the nex
 extrapolation tells an exchange (`relabeled`). But a marker on a rope or a cloth is never much farther from its
 neighbors than the material between them is long. So of two labelings of a pair, a frame costs as much as distances are
 too long in it, and a change from one labeling to the other as much as it makes the markers jump: the cheapest path
-through all frames (Viterbi) says when the two have each other's label.
+through all frames (Viterbi) says when the two have each other's label. A change needs a frame in which the markers jump
+so that crossed labels make them jump less, that is, the line from one to the other turns by more than 90 degrees. A
+cloth that unfolds, whose distances are as much too long, has no such frame.
 """
 
 from __future__ import annotations
@@ -16,7 +18,8 @@ import numpy as np
 from ..arrays.shortest_tree import tree
 from ..arrays.timeseries import Array
 
-FEWEST, MANY = 20, 300  # frames at least, and those that tell distances
+FEWEST, MANY = 20, 300  # frames at least, and those that tell distances at most
+PAIRS = 10_000_000  # of markers in these frames, at most: distances then take 0.3 GB
 TOO_LONG = 1.25  # times its median: a distance between neighbors that material allows at most
 JUMP = 0.1  # weight of a jump, squared over the distance between neighbors
 CHANGE = 0.3  # of a path, for each change
@@ -31,7 +34,8 @@ def put_back_neighbors(t: Array, positions: Array, names: Sequence[str]) -> tupl
     if len(t) < FEWEST or count < 4:
         return positions, []
     x, said = positions.copy(), list[str]()
-    some = x[:: max(1, len(x) // MANY)]
+    most = max(FEWEST, min(MANY, PAIRS // count**2))
+    some = x[:: -(-len(x) // most)]
     distance = np.linalg.norm(some[:, :, None] - some[:, None], axis=3)
     if not np.isfinite(distance).any(axis=0).all():
         return positions, []
@@ -71,6 +75,7 @@ def _pieces(x: Array, a: int, b: int, beside: list[tuple[int, int]], apart: Arra
                 same[f] += JUMP * float(np.sum((place - seen[k]) ** 2)) / size
                 crossed[f] += JUMP * float(np.sum((place - seen[other]) ** 2)) / size
         seen |= now
+    crossed[crossed >= same] = np.inf
     best, came = np.array([cost[0, 0], cost[1, 0] + CHANGE]), np.zeros((len(x), 2), int)
     for f in range(1, len(x)):
         stay, change = best + same[f], best[::-1] + crossed[f] + CHANGE
@@ -85,6 +90,7 @@ def _pieces(x: Array, a: int, b: int, beside: list[tuple[int, int]], apart: Arra
     return [
         (i, j)
         for i, j in pieces
-        if (before := cost[0, i : j + 1].sum()) - cost[1, i : j + 1].sum() > GAIN
+        if j - i + 1 < len(x)  # labels that are exchanged in all frames are not found
+        and (before := cost[0, i : j + 1].sum()) - cost[1, i : j + 1].sum() > GAIN
         and cost[1, i : j + 1].sum() < LEFT * before
     ]
