@@ -76,8 +76,8 @@ def test_readings_at_the_end_of_a_range_are_named_before_a_fit(twin: Any, step: 
     measured = sensor.recording.forces
     most = 0.5 * np.abs(measured).max()
 
-    def read(forces: np.ndarray) -> sb.Experiment:
-        return replace(e, forces=[replace(sensor, recording=replace(sensor.recording, forces=forces))])
+    def read(forces: np.ndarray, axes: str = "xyz") -> sb.Experiment:
+        return replace(e, forces=[replace(sensor, recording=replace(sensor.recording, forces=forces), axes=axes)])
 
     def rounded(x: np.ndarray) -> np.ndarray:
         return np.round(x / step) * step if step else x
@@ -86,6 +86,7 @@ def test_readings_at_the_end_of_a_range_are_named_before_a_fit(twin: Any, step: 
     assert not [words for right in (rounded(measured), repeated) for words in at_limits(read(right))]
     clipped = rounded(np.clip(measured, -most, most))
     first, *_ = at_limits(read(clipped))
+    assert not [words for words in at_limits(read(clipped, "z")) if "along x" in words]  # which does not count
     assert "readings of the force along x of wrist are exactly" in first and "Set these readings to NaN" in first
     if not step:
         names = {

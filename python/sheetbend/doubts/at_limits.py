@@ -12,6 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..experiment.experiment import Experiment
+from ..experiment.force_sensor import AXES
 from ..quantities.wording import short
 from ..statistics.white_noise import white_variance
 
@@ -20,23 +21,25 @@ LEAST = 3  # equal readings in a row
 LONGER = 2.0  # times as long as any other row of equal readings: a log may repeat each reading
 CHANCE = 1e-6  # of such a row by noise, where readings are rounded
 NOISY = 0.1  # of sigma: with less noise readings may rest at one value, as those of a simulation do
-AXES = ("x", "y", "z")
 
 
 def at_limits(e: Experiment) -> Iterator[str]:
-    """A sentence for every channel of an experiment's sensors whose readings reach a limit."""
+    """A sentence for every channel of an experiment's sensors that counts and whose readings reach a limit."""
     for sensor in e.forces:
         channels = (
-            ("force", "N", sensor.recording.forces, sensor.sigma),
-            ("torque", "N m", sensor.recording.torques, sensor.torque_sigma),
+            ("force along", "N", sensor.recording.forces, sensor.sigma, sensor.axes),
+            ("torque about", "N m", sensor.recording.torques, sensor.torque_sigma, sensor.torque_axes),
         )
-        for kind, unit, readings, sigma in channels:
-            for axis, channel in zip(AXES, () if readings is None else readings.T, strict=False):
-                for side, limit, count in _limits(channel[np.isfinite(channel)], sigma or 0.0):
+        for kind, unit, readings, sigma, counted in channels:
+            if readings is None or sigma is None:
+                continue
+            for axis in counted:
+                x = readings[np.isfinite(readings[:, AXES.index(axis)]), AXES.index(axis)]
+                for side, limit, count in _limits(x, sigma):
                     yield (
-                        f"{count} of {len(channel)} readings of the {kind} along {axis} of {sensor.name} are exactly "
-                        f"{short(limit)} {unit}, the {side} of all, in a row: the sensor seems to have reached the end "
-                        "of its range. Set these readings to NaN, which leaves them out"
+                        f"{count} of {len(x)} readings of the {kind} {axis} of {sensor.name} are exactly "
+                        f"{short(limit)} {unit}, the {side} of all, several of them in a row: in {e.name} the sensor "
+                        "seems to have reached the end of its range. Set these readings to NaN, which leaves them out"
                     )
 
 

@@ -18,6 +18,7 @@ from ..minimum.problem import FitProblem
 from ..optional import require
 from ..quantities.wording import short
 from ..recording.recording import Recording
+from ..statistics.gauge import RANK_TOLERANCE
 from .told import Told
 
 FEWEST = 16  # frames
@@ -40,10 +41,10 @@ def smoothed(problem: FitProblem, u: Array, i: int) -> list[Told]:
     except SheetbendError:
         return []
     frames, seen = np.nonzero(recording.mask)
-    _, r, J = problem.evaluate_exactly(u)
+    _, r, J = problem.evaluate(u)  # known already
     first = problem.core.first_rows[i]
     own = slice(first, first + len(frames) * len(axes))
-    q, _ = np.linalg.qr(J[own])
+    q = _basis(J[own])
     left = r[own] - q @ (q.T @ r[own])
     found = []
     for filters in (_low_passes(recording), _means(len(recording.times))):
@@ -57,6 +58,13 @@ def smoothed(problem: FitProblem, u: Array, i: int) -> list[Told]:
                 best = Told(i, "", label, "", (0.0, ""), column, slice(0, len(column)), missing=says)
         found += [] if best is None else [best]
     return found
+
+
+def _basis(columns: Array) -> Array:
+    """An orthonormal basis (rows, rank) of what some columns (rows, n) span. Parameters of other motions have zeros."""
+    columns = columns[:, columns.any(axis=0)]
+    q, sizes, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
+    return np.asarray(q[:, sizes > RANK_TOLERANCE * sizes.max(initial=0.0)])
 
 
 def _quiet(recording: Recording, axes: list[int], sigma: float) -> bool:
