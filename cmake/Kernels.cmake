@@ -18,15 +18,16 @@ if(NOT has_x86_kernels OR SHEETBEND_SANITIZE OR SHEETBEND_KERNELS STREQUAL "port
 elseif(SHEETBEND_KERNELS STREQUAL "all" OR CMAKE_CROSSCOMPILING)
   list(APPEND variants v3 v4)
 else()
-  if(NOT SHEETBEND_WIDEST_KERNELS)
-    try_run(ran compiled ${PROJECT_BINARY_DIR}/processor ${PROJECT_SOURCE_DIR}/cmake/processor.cpp
-            CMAKE_FLAGS -DINCLUDE_DIRECTORIES=${PROJECT_SOURCE_DIR} -DCMAKE_CXX_STANDARD=20 RUN_OUTPUT_VARIABLE widest)
+  # Asked again by each run of CMake, so that a build folder that another machine goes on with is right for it. The tests give an answer of their own.
+  set(widest ${SHEETBEND_WIDEST_KERNELS})
+  if(NOT widest)
+    try_run(ran compiled SOURCES ${PROJECT_SOURCE_DIR}/cmake/processor.cpp NO_CACHE
+            CMAKE_FLAGS -DINCLUDE_DIRECTORIES=${PROJECT_SOURCE_DIR} RUN_OUTPUT_VARIABLE widest CXX_STANDARD 20)
     if(NOT ran EQUAL 0)
       message(FATAL_ERROR "cmake/processor.cpp did not say what this processor runs. Fix: give -DSHEETBEND_KERNELS=all")
     endif()
-    set(SHEETBEND_WIDEST_KERNELS ${widest} CACHE INTERNAL "The widest instruction set of kernels that this processor runs")
   endif()
-  list(APPEND variants ${SHEETBEND_WIDEST_KERNELS})
+  list(APPEND variants ${widest})
   list(REMOVE_DUPLICATES variants)
 endif()
 list(JOIN variants ", " text)
