@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import ast
+import py_compile
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 import sheetbend as sb
@@ -28,12 +31,28 @@ def test_takes_at_most_a_tenth_of_a_second_over_numpy() -> None:
 
 
 def test_every_public_name_is_found() -> None:
-    assert set(sb._places()) == set(sb.__all__) <= set(dir(sb))
+    assert set(sb._MODULES) == set(sb.__all__) <= set(dir(sb)) and len(dir(sb)) == len(set(dir(sb)))
     found: dict[str, object] = {}
     exec("from sheetbend import *", found)
     assert all(found[name] is getattr(sb, name) is not None for name in sb.__all__)
     with pytest.raises(AttributeError, match="no attribute 'ropes'"):
         sb.ropes  # noqa: B018
+
+
+def test_type_checkers_see_the_same_names_from_the_same_modules() -> None:
+    tree = ast.parse(Path(sb.__file__).read_text(encoding="utf-8"))
+    seen = next(node for node in tree.body if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING")
+    imports = [node for node in seen.body if isinstance(node, ast.ImportFrom)]
+    assert {a.asname: node.module or "" for node in imports for a in node.names if a.name == a.asname} == sb._MODULES
+
+
+def test_a_package_without_its_sources_works(tmp_path: Path) -> None:
+    """As programs that are frozen into one file have it."""
+    here = Path(sb.__file__).parent
+    for name in ("__init__.py", "moved.py", "version.py", "errors.py"):
+        py_compile.compile(str(here / name), str(tmp_path / "sheetbend" / f"{name}c"), doraise=True)
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import sheetbend as sb; "
+    assert "__init__.pyc <class 'sheetbend.errors.SceneError'>" in run(code + "print(sb.__file__, sb.SceneError)")
 
 
 @pytest.mark.parametrize("notebook", ["IPython", "marimo", ""])
