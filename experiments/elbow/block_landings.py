@@ -1,10 +1,11 @@
 """Where two tossed blocks on a hinge come to rest: predictions of tosses that nothing was fitted to.
 
-    python experiments/elbow/block_landings.py
+    python experiments/elbow/block_landings.py [--others FOLDER]
 
 Each block is a rigid body with eight rounded corners, which touch the table. The numbers of the contact, of the hinge
 and of the moments of inertia are those that `block_landings_study.py` finds from every other toss. The other tosses are
-predicted from their free flight, beside predictions without physics.
+predicted from their free flight, beside predictions without physics. FOLDER holds more tosses of these blocks in an
+elbow_tosses.npz as the source's (`make_data.py`), which are predicted too.
 """
 
 from __future__ import annotations
@@ -16,10 +17,12 @@ from pathlib import Path
 
 import numpy as np
 import sheetbend as sb
-from blocks import ARM, AXIS, DATA, HINGE, MASS, RATE, SIDES, Flight, level, leveled, second_block
+from block_cutting import cut
+from blocks import ARM, AXIS, HINGE, MASS, RATE, SIDES, Flight, level, leveled, second_block
 from sheetbend.arrays.rotations import matrices_of, rotation_matrix
 from sheetbend.quantities.quantities import Term
 
+DATA = Path(__file__).parent / "data" / "tosses.npz"
 SCALE = 1.018  # of the data's lengths, from free flight
 DOWN = np.array([0.0, 0.0, -9.81 / SCALE])  # m/s^2 in the unit of the data
 FEWEST = 7  # frames of free flight from which the state at the start is known well
@@ -57,9 +60,9 @@ class Toss(Flight):
         return (self.positions + self.second()[0]) / 2.0
 
 
-def tosses(folder: Path = DATA) -> list[Toss]:
-    """All of them, in the order of the source."""
-    data = np.load(folder / "tosses.npz")
+def tosses(folder: Path | None = None) -> list[Toss]:
+    """All of them, in the order of the source: the ones that are shipped, or those of a folder."""
+    data = np.load(DATA) if folder is None else cut(np.load(folder / "elbow_tosses.npz"))[1]
     x, q, angles = (data[key].astype(float) for key in ("positions", "quaternions", "angles"))
     ends = zip(data["starts"][:-1], data["starts"][1:], data["toss"], data["free"], strict=True)
     return [
@@ -207,6 +210,9 @@ def without_physics(toss: Toss) -> np.ndarray:
 
 
 def report(label: str, group: list[Toss], values: Mapping[str, float]) -> None:
+    if not group:
+        print(f"{label}: none")
+        return
     found = np.array([errors(toss, values) for toss in group])
     mean, middle = found.mean(axis=0), np.median(found, axis=0)
     print(
@@ -223,22 +229,25 @@ def halves() -> tuple[list[Toss], list[Toss]]:
     return every[::2], every[1::2]
 
 
-def main(folder: Path) -> None:
-    seen, rest = halves() if folder == DATA else ([], tosses(folder))
+def main(folder: Path | None) -> None:
+    seen, rest = halves()
     values = of_both(FOUND)
-    if seen:
-        report("the half that the numbers are from", seen, values)
+    report("the half that the numbers are from", seen, values)
     report("others", rest, values)
     report(f"others with {FEWEST} frames of free flight or more", [t for t in rest if t.free >= FEWEST], values)
     plain = np.mean([without_physics(toss) for toss in rest], axis=0)
     guesses = ("lie where they were seen last", "fly on until they are as low as they rest")
     for label, row in zip(guesses, plain, strict=True):
         print(f"others without physics, {label}: {row[0]:.0f} mm over time, {row[1]:.0f} at rest")
+    if folder is not None:
+        known = {toss.name for toss in seen}
+        held_out = [toss for toss in tosses(folder) if toss.name not in known]
+        flown = [toss for toss in held_out if toss.free >= FEWEST]
+        report(f"others of {folder}", held_out, values)
+        report(f"others of {folder} with {FEWEST} frames of free flight or more", flown, values)
 
 
 if __name__ == "__main__":
-    from make_data import cut
-
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--source", type=Path, help="a folder with other tosses, as make_data.py takes it")
-    main(cut(parser.parse_args().source))
+    parser.add_argument("--others", type=Path, metavar="FOLDER", help="more tosses of these blocks to predict")
+    main(parser.parse_args().others)

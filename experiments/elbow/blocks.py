@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +11,7 @@ import sheetbend as sb
 from sheetbend.arrays.rotations import matrices_of, quaternions_of, rotation_matrix
 from sheetbend.quantities.quantities import product
 
-DATA = Path(__file__).parent / "data"
+DATA = Path(__file__).parent / "data" / "flights.npz"
 RATE, MASS, SIDES = 148.0, 0.37, np.array([0.1, 0.05, 0.05])  # Hz, kg, m
 HINGE, ARM = np.array([-0.035, 0.06, 0.0]), np.array([0.035, 0.0, 0.0])  # m: center to hinge, hinge to second center
 AXIS = (0.0, 1.0, 0.0)
@@ -68,9 +68,9 @@ def leveled(number: int, positions: np.ndarray, quaternions: np.ndarray) -> tupl
     return positions @ turn.T, quaternions_of(turn @ matrices_of(quaternions))
 
 
-def flights(folder: Path = DATA) -> list[Flight]:
-    """All of them, in the order of the source, in axes of which z is vertical."""
-    data = np.load(folder / "flights.npz")
+def flights(data: Mapping[str, np.ndarray] | None = None) -> list[Flight]:
+    """The shipped ones, or given ones of `block_cutting.cut`, in the order of the source; z is vertical."""
+    data = np.load(DATA) if data is None else data
     ends = zip(data["starts"][:-1], data["starts"][1:], data["toss"], strict=True)
     x, q, angles = (data[key] for key in ("positions", "quaternions", "angles"))
     return [Flight(f"toss {n}", np.arange(b - a) / RATE, *leveled(n, x[a:b], q[a:b]), angles[a:b]) for a, b, n in ends]

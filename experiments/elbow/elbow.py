@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import sheetbend as sb
+from block_cutting import cut
 from blocks import RATE, SEEN, Flight, experiment, flights, parameters, scene_of
 from sheetbend.arrays.rotations import matrices_of
 
@@ -43,8 +44,9 @@ def predicted(flight: Flight, gravity: float, viscosity: float) -> list[float]:
     return errors
 
 
-def main(count: int | None, folder: Path) -> None:
-    every = flights(folder)[:count]
+def main(count: int | None, folder: Path | None) -> None:
+    given = None if folder is None else cut(np.load(folder / "elbow_tosses.npz"))[0]
+    every = flights(given)[:count]
     middle = (len(every) + 1) // 2
     halves = [every[:middle], every[middle:]]
     found = []
@@ -72,10 +74,10 @@ def main(count: int | None, folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    from make_data import cut
-
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--flights", type=int, help="how many of them; all by default")
-    parser.add_argument("--source", type=Path, help="a folder with other tosses, as make_data.py takes it")
+    parser.add_argument(
+        "--source", type=Path, metavar="FOLDER", help="other tosses of the source, instead of the shipped ones"
+    )
     given = parser.parse_args()
-    main(given.flights, cut(given.source))
+    main(given.flights, given.source)

@@ -44,6 +44,23 @@ def test_gravity_of_two_flights_is_that_of_the_cube() -> None:
     assert abs(found.value - 9.64) < found.half_width < 0.2
 
 
+def test_tosses_of_another_folder_are_cut_as_the_shipped_ones(tmp_path: Path) -> None:
+    """The shipped ones again, in the columns of the source: a toss begins with its flight already."""
+    from block_cutting import cut
+    from block_landings import DATA, tosses
+    from blocks import flights
+
+    shipped = np.load(DATA)
+    columns = {"starts": shipped["starts"], "toss": shipped["toss"], "angle": shipped["angles"].astype(float)}
+    columns |= {"position": shipped["positions"].astype(float), "quaternion": shipped["quaternions"][:, [3, 0, 1, 2]]}
+    np.savez(tmp_path / "elbow_tosses.npz", **columns)
+    for old, new in zip(tosses(), tosses(tmp_path), strict=True):
+        assert (new.name, new.free) == (old.name, old.free)
+        assert np.array_equal(new.positions, old.positions) and np.array_equal(new.angles, old.angles)
+    for old, new in zip(flights(), flights(cut(columns)[0]), strict=True):
+        assert new.name == old.name and new.positions == pytest.approx(old.positions, abs=1e-6)
+
+
 def test_tosses_come_to_rest_nearer_than_without_physics() -> None:
     from block_landings import FEWEST, FOUND, errors, halves, of_both, without_physics
 
