@@ -46,18 +46,30 @@ def mean_of(frames: int) -> Any:
 @pytest.mark.parametrize(
     ("smooth", "words"),
     [
-        (low_pass(6.0), "its markers were filtered, with a cut-off near 5.8 Hz"),
-        (low_pass(10.0), "its markers were filtered, with a cut-off near 10 Hz"),
-        (mean_of(11), "its markers were averaged over about 1"),
+        (low_pass(6.0), "the markers were filtered, with a cut-off near 5.8 Hz"),
+        (low_pass(10.0), "the markers were filtered, with a cut-off near 10 Hz"),
+        (mean_of(11), "the markers were averaged over about 1"),
     ],
 )
 def test_filtered_markers_are_named(smooth: Any, words: str) -> None:
     """6 Hz made bend damping 23 % too large, 1.1 half-widths in all, "identified" without a word."""
     found = sb.fit([fell(0, smooth)], parameters=tuple(TRUE)).result
-    (named,) = [w for w in found.warnings if "its markers were" in w]
+    (named,) = [w for w in found.warnings if "the markers were" in w]
     assert words in named and "Check that, and mend the model or the recording" in named
     off = abs(found["rope_bend_damping"].value - TRUE["rope_bend_damping"])
     assert found["rope_bend_damping"].verdict == "doubtful" or off < found["rope_bend_damping"].in_all
+
+
+def test_recordings_that_were_filtered_alike_are_named_together() -> None:
+    """Filters of other cut-offs explain most of each, and a cut-off is another part of another frame rate."""
+    low = fell(1, low_pass(6.0))
+    often = np.arange(201) / 200
+    x = sb.simulate(rope(), often, FINE).positions[:, AT]
+    x = x + SIGMA * np.random.default_rng(2).standard_normal(x.shape)
+    b, a = butter(2, 6.0 / 100.0)
+    high = replace(low, recording=sb.Recording(filtfilt(b, a, x, axis=0), often, name="often"), name="often")
+    found = sb.fit([low, high], parameters=tuple(TRUE)).result
+    assert [w for w in found.warnings if "the markers were filtered, with a cut-off near 5.8 Hz. Check" in w]
 
 
 @pytest.mark.parametrize("smooth", [None, lambda x: np.round(x, 4), low_pass(45.0)])
@@ -65,7 +77,7 @@ def test_markers_with_their_noise_are_not_said_to_be_filtered(smooth: Any) -> No
     e = fell(1, smooth)
     for told in (e, replace(e, scene=rope(bend_damping=0.02))):  # and where the model is wrong
         found = sb.fit([told], parameters=("rope_EI", "rope_drag_linear")).result
-        assert not [w for w in found.warnings if "its markers were" in w]
+        assert not [w for w in found.warnings if "the markers were" in w]
 
 
 @pytest.mark.parametrize("step", [0.0, 2e-3])

@@ -47,16 +47,19 @@ def smoothed(problem: FitProblem, u: Array, i: int) -> list[Told]:
     q = _basis(J[own])
     left = r[own] - q @ (q.T @ r[own])
     found = []
-    for filters in (_low_passes(recording), _means(len(recording.times))):
+    for label, says, filters in (
+        ("cut-off", _cut_off, _low_passes(recording)),
+        ("mean", _width, _means(len(recording.times))),
+    ):
         best, most = None, 0.0
-        for label, says, smooth in filters:
+        for size, smooth in filters:
             column = ((smooth(shown) - shown)[frames, seen] / e.sigma).ravel()
             beside = column - q @ (q.T @ column)
             along, inner = float(beside @ left), float(beside @ beside)
             if along < 0.0 and along**2 > most * inner:
-                most = along**2 / inner
-                best = Told(i, "", label, "", (0.0, ""), column, slice(0, len(column)), missing=says)
-        found += [] if best is None else [best]
+                most, best = along**2 / inner, column / size
+        if best is not None:
+            found.append(Told(i, "", label, "", (0.0, ""), best, slice(0, len(best)), missing=says))
     return found
 
 
@@ -78,30 +81,32 @@ def _quiet(recording: Recording, axes: list[int], sigma: float) -> bool:
     return bends.size > 0 and float(np.mean(bends**2)) < QUIET * sigma**2 * BENDS
 
 
-Filter = tuple[str, Callable[[float], str], Callable[[Array], Array]]
+Filters = Iterator[tuple[float, Callable[[Array], Array]]]
+"""Filters, and the size of each: to first order, what one changes goes with it. So recordings that were filtered alike
+share one direction, whichever filter explains most of each."""
 
 
-def _low_passes(recording: Recording) -> Iterator[Filter]:
-    """Butterworth filters of second order, forward and backward. A multiple of what one changes is to first order what
-    a lower cut-off does: it goes with the fourth power of frequency over cut-off."""
+def _low_passes(recording: Recording) -> Filters:
+    """Butterworth filters of second order, forward and backward, of size 1/Hz^4: what one changes goes with the fourth
+    power of frequency over cut-off."""
     signal, nyquist = require("scipy.signal", "fit"), 0.5 / float(np.diff(recording.times).mean())
     for part in CUTOFFS:
         sections = signal.butter(2, part, output="sos")
-
-        def says(size: float, at: float = part * nyquist) -> str:
-            return f"its markers were filtered, with a cut-off near {short(at / max(size, 1e-3) ** 0.25, 2)} Hz"
-
-        yield f"cut-off {part:.3g}", says, partial(signal.sosfiltfilt, sections, axis=0)
+        yield (part * nyquist) ** -4, partial(signal.sosfiltfilt, sections, axis=0)
 
 
-def _means(frames: int) -> Iterator[Filter]:
-    """Means over some of so many frames. A multiple of what one changes goes with the square of its width."""
+def _cut_off(size: float) -> str:
+    return f"the markers were filtered, with a cut-off near {short(size**-0.25, 2)} Hz"
+
+
+def _means(frames: int) -> Filters:
+    """Means over some of so many frames, of size frames^2: what one changes goes with the square of its width."""
     for width in (w for w in WINDOWS if w < frames):
+        yield width**2, partial(_mean, width=width)
 
-        def says(size: float, width: int = width) -> str:
-            return f"its markers were averaged over about {short(width * max(size, 1e-3) ** 0.5, 2)} frames"
 
-        yield f"mean of {width}", says, partial(_mean, width=width)
+def _width(size: float) -> str:
+    return f"the markers were averaged over about {short(size**0.5, 2)} frames"
 
 
 def _mean(x: Array, width: int) -> Array:

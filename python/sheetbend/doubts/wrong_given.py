@@ -58,7 +58,7 @@ LONGEST = 5e7  # rows times directions: above, markers are asked only all togeth
 def wrong_given(
     problem: FitProblem, u: Array, told: Sequence[Told], refinement: Refinement | None = None
 ) -> list[Wrong]:
-    """What residuals ask of the told numbers, and of what the model lacks: two sets of tangents of motions whose
+    """What residuals ask of the told numbers, and of what the model lacks: some sets of tangents of motions whose
     residuals are more than noise.
 
     Args:
