@@ -8,8 +8,8 @@
 namespace sheetbend {
 namespace {
 
-constexpr double most_per_box = 16.0;           // cells on average
-constexpr double most_cells = 1024.0 * 1024.0;  // along an axis
+constexpr double most_per_box = 16.0;  // cells on average
+constexpr double too_far = 1e15;       // in cells from the origin, where their numbers are no longer exact
 
 bool is_finite(const Box& box) {
   for (int d = 0; d < 3; ++d)
@@ -17,46 +17,47 @@ bool is_finite(const Box& box) {
   return true;
 }
 
-bool overlap(const Box& a, const Box& b) {  // not where one is not finite
+constexpr Box nowhere{{NAN, NAN, NAN}, {NAN, NAN, NAN}};
+
+bool overlap(const Box& a, const Box& b) {  // not where one is nowhere
   for (int d = 0; d < 3; ++d)
     if (!(a.high[d] >= b.low[d] && b.high[d] >= a.low[d])) return false;
   return true;
 }
 
-// As wide as boxes are on average; wider where some would cover too many cells.
-double width_of_cells(const std::vector<Box>& boxes, double extent) {
-  double size = 0.0;
+// As wide as the box in the middle of their order by width, which a few large ones do not move; wider where the boxes would cover too many cells. One that
+// covers more cells than there are boxes counts as often as it is compared.
+double width_of_cells(const std::vector<Box>& boxes) {
+  std::vector<double> widths;
+  widths.reserve(boxes.size());
   for (const Box& b : boxes) {
+    if (!is_finite(b)) continue;
     double widest = 0.0;
     for (int d = 0; d < 3; ++d) widest = std::max(widest, b.high[d] - b.low[d]);
-    if (std::isfinite(widest)) size += widest / static_cast<double>(boxes.size());
+    widths.push_back(widest);
   }
-  size = std::max({size, extent / most_cells, 1e-300});
+  if (widths.empty()) return 1.0;
+  const auto middle = widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / 2);
+  std::nth_element(widths.begin(), middle, widths.end());
+  double size = std::max(*middle, 1e-300);
+  const double count = static_cast<double>(boxes.size());
   const auto covered = [&] {
     double sum = 0.0;
     for (const Box& b : boxes) {
+      if (!is_finite(b)) continue;
       double cells = 1.0;
       for (int d = 0; d < 3; ++d) cells *= std::floor((b.high[d] - b.low[d]) / size) + 2.0;
-      if (std::isfinite(cells)) sum += cells;
+      sum += std::min(cells, most_per_box + count);
     }
     return sum;
   };
-  while (covered() > most_per_box * static_cast<double>(boxes.size())) size *= 2.0;
+  while (covered() > most_per_box * count) size *= 2.0;
   return size;
 }
 
 }  // namespace
 
-BoxGrid::BoxGrid(std::vector<Box> boxes, bool listed) : boxes_(std::move(boxes)) {
-  double extent = 0.0;
-  for (int d = 0; d < 3; ++d) {
-    double low = HUGE_VAL, high = -HUGE_VAL;
-    for (const Box& b : boxes_)
-      if (is_finite(b)) low = std::min(low, b.low[d]), high = std::max(high, b.high[d]);
-    origin_[d] = low;
-    extent = std::max(extent, high - low);
-  }
-  cell_ = width_of_cells(boxes_, extent);
+BoxGrid::BoxGrid(std::vector<Box> boxes, bool listed) : boxes_(std::move(boxes)), cell_(width_of_cells(boxes_)) {
   first_.assign(std::bit_ceil(4 * boxes_.size() + 1), -1);
   for (int i = 0; listed && i < static_cast<int>(boxes_.size()); ++i) list(i);
 }
@@ -66,10 +67,11 @@ bool BoxGrid::for_each_cell(const Box& box, Visit&& visit) const {
   std::int64_t from[3], to[3];
   double cells = 1.0;
   for (int d = 0; d < 3; ++d) {
-    const double low = std::floor((box.low[d] - origin_[d]) / cell_);
-    const double high = std::floor((box.high[d] - origin_[d]) / cell_);
+    const double low = std::floor(box.low[d] / cell_);
+    const double high = std::floor(box.high[d] / cell_);
     cells *= high - low + 1.0;
-    if (!(std::max(std::abs(low), std::abs(high)) < 1e15 && cells <= most_per_box + static_cast<double>(boxes_.size())))
+    if (!(std::max(std::abs(low), std::abs(high)) < too_far &&
+          cells <= most_per_box + static_cast<double>(boxes_.size())))
       return false;
     from[d] = static_cast<std::int64_t>(low), to[d] = static_cast<std::int64_t>(high);
   }
@@ -94,7 +96,7 @@ void BoxGrid::list(int i) {
 }
 
 void BoxGrid::move(int i, const Box& to) {
-  boxes_[i] = to;
+  boxes_[i] = is_finite(to) ? to : nowhere;
   list(i);
 }
 

@@ -10,7 +10,8 @@ struct Box {
   double low[3], high[3];
 };
 
-// Boxes, each listed in the cells that it covers. One that covers more cells than there are boxes is compared with all.
+// Boxes, each listed in the cells that it covers. One that covers more cells than there are boxes is compared with all, as is one that is so far from the
+// origin that doubles do not tell cells apart.
 class BoxGrid {
  public:
   BoxGrid() = default;
@@ -34,7 +35,7 @@ class BoxGrid {
   bool for_each_cell(const Box& box, Visit&& visit) const;  // false, without a visit, where they are too many
 
   std::vector<Box> boxes_;
-  double origin_[3]{}, cell_ = 1.0;
+  double cell_ = 1.0;
   std::vector<int> first_;      // by the hash of a cell
   std::vector<Entry> entries_;  // some of boxes that have moved away
   std::vector<int> wide_, found_;

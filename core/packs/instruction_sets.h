@@ -8,7 +8,7 @@ namespace sheetbend {
 // Those that kernels are compiled for in this build, widest first, whether this processor runs them or not.
 std::vector<const char*> compiled_instruction_sets();
 
-#if defined(__x86_64__) || defined(_M_X64)
+#ifdef __x86_64__
 inline bool runs_v3() {
   __builtin_cpu_init();
   return __builtin_cpu_supports("popcnt") && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi") &&

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <random>
 
@@ -254,7 +255,7 @@ bool meet(const Box& p, const Box& q) {
   return true;
 }
 
-// Boxes that move, far away and wide too, and one that is not finite.
+// Boxes that move, far away and wide too, and some that are not finite.
 TEST(Pairs, AreFoundByAGridWhileBoxesMove) {
   constexpr int count = 60;
   const auto any_box = [](double spread, double size) {
@@ -268,6 +269,7 @@ TEST(Pairs, AreFoundByAGridWhileBoxesMove) {
   std::vector<Box> boxes;
   for (int i = 0; i < count; ++i) boxes.push_back(any_box(1.0, 0.4));
   boxes[5].low[1] = std::numeric_limits<double>::quiet_NaN();
+  const auto is_finite = [](const Box& box) { return std::isfinite(box.high[1] - box.low[1]); };
   BoxGrid grid(boxes);
   std::size_t all = 0;
   for (int turn = 0; turn < 300; ++turn) {
@@ -275,11 +277,12 @@ TEST(Pairs, AreFoundByAGridWhileBoxesMove) {
     boxes[moved] = turn % 50 == 7    ? any_box(1e18, 1.0)
                    : turn % 50 == 17 ? any_box(1.0, 30.0)
                                      : any_box(1.2, turn % 3 == 0 ? 1.0 : 0.3);
+    if (turn % 50 == 27) boxes[moved].low[1] = -HUGE_VAL, boxes[moved].high[1] = HUGE_VAL;
     grid.move(moved, boxes[moved]);
     const Box& of = boxes[turn * 7 % count];
     std::vector<int> expected;
-    for (int i = 0; i < count && std::isfinite(of.low[1]); ++i)
-      if (std::isfinite(boxes[i].low[1]) && meet(boxes[i], of)) expected.push_back(i);
+    for (int i = 0; i < count && is_finite(of); ++i)
+      if (is_finite(boxes[i]) && meet(boxes[i], of)) expected.push_back(i);
     EXPECT_EQ(grid.around(of), expected) << turn;
     all += expected.size();
   }
@@ -294,7 +297,8 @@ TEST(Pairs, AreFoundByAGridAsByLookingAtAll) {
         Box box;
         for (int d = 0; d < 3; ++d) {
           box.low[d] = uniform(-1.0, 1.0);
-          box.high[d] = box.low[d] + uniform(0.0, i == 7 ? 3.0 : size);
+          if (i == 8) box.low[d] -= 1e18 * d;
+          box.high[d] = box.low[d] + uniform(0.0, i == 7 ? 3.0 : i % 40 == 9 ? 1e9 * size : size);
         }
         list->push_back(box);
       }
