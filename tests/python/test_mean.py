@@ -82,15 +82,18 @@ def test_a_mean_is_kept_in_a_file(tmp_path: Path) -> None:
 def test_what_is_no_mean_is_refused() -> None:
     scene, made, face = beam(held=())
     own = made.particles[face]
+    nodes = len(scene.nodes)
     for particles, given, match in (
         (own[:2], {}, "three or more"),
-        ([own[0], own[0], own[1]], {}, "each once"),
+        ([own[0], own[0], own[1]], {}, "list each particle once"),
+        (own, {"name": "beam_strain"}, "is taken by another group"),
         (own, {"weights": np.zeros(len(own))}, "weights: must be positive"),
         (own, {"weights": [1.0]}, "weights"),
         (own, {"mass": 0.0}, "mass: must be positive"),
     ):
         with pytest.raises(sb.SceneError, match=match):
             sb.add_mean(scene, particles, **given)
+    assert len(scene.nodes) == nodes and not scene.means
     with pytest.raises(sb.MeshError, match="no face of the surface"):
         made.mesh.areas(face[:3])
     assert made.mesh.areas(face).sum() == approx(9e-4, rel=1e-12)

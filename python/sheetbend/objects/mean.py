@@ -22,7 +22,8 @@ def add_mean(
     What holds, loads or pulls it acts on all of them, each with its weight, and does not keep them in shape: pin it,
     give it a point mass or a force, or constrain it. A marker on it shows the mean.
 
-    The constraint `coincide` sums up to six nodes. Of more particles there are means of parts, hidden nodes.
+    The constraint `coincide` sums up to six nodes. Of more particles there are means of parts, hidden nodes. The sweeps
+    of "gauss_seidel" move them too slowly: use another method.
 
     Args:
         scene: of the particles.
@@ -42,9 +43,12 @@ def add_mean(
     check_scene(scene)
     check_label("mean.name", name)
     own = scene.node_array(f"{name}.particles", particles)
-    if len(own) < 3 or len(np.unique(own)) < len(own):
-        fix = "list each particle once"
-        raise SceneError(f"{name}.particles", "are not three or more, each once", own.tolist(), fix)
+    if any(group.name == name for group in scene.groups):
+        raise SceneError("mean.name", "is taken by another group", name, "give each mean a name of its own")
+    if len(own) < 3:
+        raise SceneError(f"{name}.particles", "must be three or more", own.tolist(), "hold or load fewer themselves")
+    if len(np.unique(own)) < len(own):
+        raise SceneError(f"{name}.particles", "must differ", own.tolist(), "list each particle once, give it a weight")
     w = np.ones(len(own)) if weights is None else finite(f"{name}.weights", weights, (len(own),), SceneError)
     if not (w > 0).all():
         raise SceneError(f"{name}.weights", "must be positive", w.tolist(), "leave out particles without a weight")
