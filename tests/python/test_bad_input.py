@@ -241,6 +241,7 @@ ROPE = {
     "clamp not finite": ("rope.clamp_end", lambda: rope(EI=1e-3, clamp_end=(0, NAN, 0))),
     "clamp angles without a plane": ("rope.plane", lambda: rope(EI=1e-3, clamp_start=(1, 0, 0), clamp_angles=True)),
     "a set without a plane": ("rope.plane", lambda: rope(EI=1e-3, set_modes=(1,))),
+    "a set that is no list": ("rope.set_modes", lambda: rope(EI=1e-3, set_modes=1)),
     "a set without EI": ("rope.set_modes", lambda: rope(plane=(0, 1, 0), set_modes=(1,))),
     "a mode twice": ("rope_set_1", lambda: rope(EI=1e-3, plane=(0, 1, 0), set_modes=(1, 1))),
     "a rope's name twice": ("rope_length", after(*[lambda s: sb.add_rope(s, length=1.0, density=1.0)] * 2)),

@@ -127,9 +127,11 @@ def test_a_number_of_a_node_asks_for_no_memory(tmp_path, version, binary, old, n
     meshio.gmsh.write(path, mesh, fmt_version=version, binary=binary)
     content = path.read_bytes()
     assert old in content and len(sb.mesh.read_solid(path).vertices) == 8
-    path.write_bytes(content.replace(old, new + old[len(new) :] if binary else new, 1))
-    with pytest.raises(sb.MeshError, match="nodes: have numbers whose table takes"):
-        sb.mesh.read_solid(path)
+    damaged = content.replace(old, new + old[len(new) :] if binary else new, 1)
+    for end in (b"\n",) if binary else (b"\n", b"\r\n"):
+        path.write_bytes(damaged.replace(b"\n", end))
+        with pytest.raises(sb.MeshError, match="nodes: have numbers whose table takes"):
+            sb.mesh.read_solid(path)
 
 
 def test_tetrahedra_are_told_by_how_much_they_lock():

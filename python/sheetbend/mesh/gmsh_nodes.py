@@ -16,6 +16,7 @@ from ..files.door import EXPANSION, ROOM
 from ..files.memory import in_words
 
 _HEAD = re.compile(rb"\$MeshFormat\s+([0-9.]+)\s+([01])")
+_NODES = re.compile(rb"\$Nodes[ \t\r]*\n")
 _NODE = np.dtype([("number", "<i4"), ("x", "<f8", (3,))])  # of versions before 4.1
 _DIGITS = 18  # no number of a node is longer
 
@@ -34,10 +35,10 @@ def check_nodes(path: Path) -> None:
 
 
 def _largest(content: bytes) -> int:
-    head, at = _HEAD.search(content), content.find(b"$Nodes\n")
-    if head is None or at < 0:
+    head, section = _HEAD.search(content), _NODES.search(content)
+    if head is None or section is None:
         return 0
-    at += len(b"$Nodes\n")
+    at = section.end()
     if head[2] == b"0":
         end = content.find(b"$EndNodes", at)
         firsts = (

@@ -27,11 +27,11 @@ def check_modes(
 ) -> None:
     """Raises SceneError where the modes of a rest curvature are no whole numbers, where nothing bends, and where the
     normal of the plane is missing that they and angles of clamps turn about."""
+    if not is_list(modes) or any(not is_number(k) or k != int(k) or k < 0 for k in modes):
+        raise SceneError(f"{name}.set_modes", "must be whole numbers from 0 on", modes, "give such as (0, 1)")
     if normal is None and (clamp_angles or len(modes)):
         fix = "give the unit normal that the clamp angles or the set turn about"
         raise SceneError(f"{name}.plane", "is missing", None, fix)
-    if not is_list(modes) or any(not is_number(k) or k != int(k) or k < 0 for k in modes):
-        raise SceneError(f"{name}.set_modes", "must be whole numbers from 0 on", modes, "give such as (0, 1)")
     if len(modes) and EI is None:
         raise SceneError(f"{name}.set_modes", "need EI", EI, "give EI: a rest curvature acts through bending")
     if EI is None and np.size(softness_modes):
