@@ -230,6 +230,7 @@ def halves() -> tuple[list[Toss], list[Toss]]:
 
 
 def main(folder: Path | None) -> None:
+    more = [] if folder is None else tosses(folder)
     seen, rest = halves()
     values = of_both(FOUND)
     report("the half that the numbers are from", seen, values)
@@ -239,9 +240,9 @@ def main(folder: Path | None) -> None:
     guesses = ("lie where they were seen last", "fly on until they are as low as they rest")
     for label, row in zip(guesses, plain, strict=True):
         print(f"others without physics, {label}: {row[0]:.0f} mm over time, {row[1]:.0f} at rest")
-    if folder is not None:
+    if more:
         known = {toss.name for toss in seen}
-        held_out = [toss for toss in tosses(folder) if toss.name not in known]
+        held_out = [toss for toss in more if toss.name not in known]
         flown = [toss for toss in held_out if toss.free >= FEWEST]
         report(f"others of {folder}", held_out, values)
         report(f"others of {folder} with {FEWEST} frames of free flight or more", flown, values)

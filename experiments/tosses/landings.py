@@ -200,6 +200,7 @@ def main(count: int, folder: Path | None) -> None:
     held_out = [toss for toss in more if toss.name not in known and toss.free >= FEWEST]
     if more:
         print(f"{folder}: {len(more)} tosses, {len(held_out)} with {FEWEST} frames before contact that were not fitted")
+    if held_out:
         for seen in (None, SEEN):
             report(f"fitted, {len(held_out)} of {folder}", held_out, found, seen)
         report(f"authors, {len(held_out)} of {folder}", held_out, AUTHORS)
