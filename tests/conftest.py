@@ -8,6 +8,9 @@ Tests that take more than 0.4 s of the processor, or 2 s in all of their cases, 
 source says so because they take seconds. slow_tests.txt lists them. This measures them again, in one process:
 
     pytest --record-slow
+
+Choose whole files where you do not measure all. The first test of a file pays for what its tests share (imports, data
+of the module): a second run that leaves this test out marks the next one, however quick it is.
 """
 
 from __future__ import annotations
