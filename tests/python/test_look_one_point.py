@@ -54,6 +54,28 @@ def test_what_one_point_does_not_show_is_asked_for(tmp_path: Path, options: tupl
     assert result.exit_code == 2 and f"error {missing}" in result.output
 
 
+def test_a_laser_that_loses_the_beam_is_said_to(tmp_path: Path) -> None:
+    """It was refused with the advice to record three markers on a rope. Without these frames a draft is made."""
+    t, seen = np.arange(0.0, 1.6, 1 / RATE), plucked(1.6)
+    x = np.zeros((len(t), 1, 3))
+    x[:, 0, 2] = seen
+    x[300:305] = np.nan
+    options = ("--length", LENGTH, "--at", AT, "--output", tmp_path / "draft.toml")
+    sb.Recording(x, t, markers=["laser"], name="strip").save(tmp_path / "strip.npz")
+    result = run("new", tmp_path / "strip.npz", *options)
+    assert result.exit_code == 2 and "lost in some frames of a beam" in result.output and "5 of 800" in result.output
+    kept = np.isfinite(x[:, 0, 2])
+    sb.Recording(x[kept], t[kept], markers=["laser"], name="strip").save(tmp_path / "strip.npz")
+    assert run("new", tmp_path / "strip.npz", *options).exit_code == 0
+
+
+def test_noise_is_that_of_the_one_coordinate(tmp_path: Path) -> None:
+    """The mean over all three, of which two have none, made sigma 42 % too small."""
+    noisy = plucked(1.6) + np.random.default_rng(0).normal(0.0, 1e-4, 800)
+    _, content = drafted(table(tmp_path, noisy))
+    assert content["recording"][0]["sigma"] == pytest.approx(1e-4, rel=0.1)
+
+
 def test_at_is_of_one_point(tmp_path: Path) -> None:
     seen = np.random.default_rng(1).normal(0.0, 1e-3, (40, 6, 3)).cumsum(axis=0) + np.linspace(0, 1, 6)[:, None]
     sb.Recording(seen, np.arange(40) / 60, name="rope").save(tmp_path / "rope.npz")

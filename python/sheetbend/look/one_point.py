@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..arrays import timeseries
 from ..errors import RecordingError
 from ..recording.oscillation import first_frequency
 from .cantilever import FIRST_MODE, LOSS, turning
@@ -54,8 +55,12 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     s = takes[0].seen
     r = s.recording
     axis = _axis(s)
-    if len(takes) > 1 or axis is None or not r.mask.all():
+    if len(takes) > 1 or axis is None:
         return None
+    if not r.mask.all():
+        got = "; ".join([f"{np.count_nonzero(~r.mask)} of {len(r.times)} frames", *r.mends])
+        fix = "leave these frames out of the file; the others keep their times"
+        raise RecordingError("markers", "are lost in some frames of a beam that one marker shows", got, fix)
     swing = r.positions[:, 0, axis] - np.median(r.positions[len(r.times) // 2 :, 0, axis])
     start, held = _start(s, swing)
     free = r.times >= start
@@ -164,7 +169,8 @@ def _lines(take: Take, measured: Measured, beam: Swing) -> list[str]:
     entries: dict[str, Any] = {**take.reading, "start": "equilibrium", "start_time": start}
     entries |= {"time_offset": "clock", "fit": [start + 2.0 * step, last]} if beam.held else {"fit": [start, last]}
     entries |= {"held_out": [last, min(last + PREDICTED / frequency, float(r.times[-1]) - 3.0 * step)]}
-    entries |= {"sigma": max(take.seen.noise, FINEST * abs(beam.load)), "axes": "xyz"[axis]}
+    noise = float(np.nan_to_num(timeseries.noise(r.times, r.positions[..., [axis]])[0]))  # the others may have none
+    entries |= {"sigma": max(noise, FINEST * abs(beam.load)), "axes": "xyz"[axis]}
     entries |= {
         "offsets": {r.markers[0]: ["", "", "zero"]},
         "marker": [{"marker": r.markers[0], "arc_length": beam.at}],
