@@ -22,7 +22,7 @@ def chain(seed: int) -> tuple[np.ndarray, np.ndarray]:
     return t, x
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [*range(6), 28])  # of 28 a marker is lost where an exchange begins
 def test_neighbors_get_their_labels_back(seed: int) -> None:
     """A rope of 0.9 m was drafted with 1.34 m: a marker goes farther between two frames than to its neighbor."""
     t, right = chain(seed)

@@ -4,9 +4,8 @@ Where frames are far apart in time, markers go farther from one frame to the nex
 extrapolation tells an exchange (`relabeled`). But a marker on a rope or a cloth is never much farther from its
 neighbors than the material between them is long. So of two labelings of a pair, a frame costs as much as distances are
 too long in it, and a change from one labeling to the other as much as it makes the markers jump: the cheapest path
-through all frames (Viterbi) says when the two have each other's label. A change needs a frame in which the markers jump
-so that crossed labels make them jump less, that is, the line from one to the other turns by more than 90 degrees. A
-cloth that unfolds, whose distances are as much too long, has no such frame.
+through all frames (Viterbi) says when the two have each other's label. A change needs a frame in which the line from
+one to the other turns by more than 90 degrees. A cloth that unfolds, whose distances are as much too long, has none.
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays.shortest_tree import tree
 from ..arrays.timeseries import Array
@@ -75,7 +75,7 @@ def _pieces(x: Array, a: int, b: int, beside: list[tuple[int, int]], apart: Arra
                 same[f] += JUMP * float(np.sum((place - seen[k]) ** 2)) / size
                 crossed[f] += JUMP * float(np.sum((place - seen[other]) ** 2)) / size
         seen |= now
-    crossed[crossed >= same] = np.inf
+    crossed[~_turns(x[:, b] - x[:, a])] = np.inf
     best, came = np.array([cost[0, 0], cost[1, 0] + CHANGE]), np.zeros((len(x), 2), int)
     for f in range(1, len(x)):
         stay, change = best + same[f], best[::-1] + crossed[f] + CHANGE
@@ -94,3 +94,13 @@ def _pieces(x: Array, a: int, b: int, beside: list[tuple[int, int]], apart: Arra
         and (before := cost[0, i : j + 1].sum()) - cost[1, i : j + 1].sum() > GAIN
         and cost[1, i : j + 1].sum() < LEFT * before
     ]
+
+
+def _turns(line: Array) -> NDArray[np.bool_]:
+    """(frames,) whether a line (frames, 3), NaN where an end is lost, turns by more than 90 degrees between the frames
+    about each in which it is seen."""
+    found, seen = np.zeros(len(line), bool), np.flatnonzero(np.isfinite(line[:, 0]))
+    turned = (line[seen[1:]] * line[seen[:-1]]).sum(axis=1) < 0.0
+    for before, here in zip(seen[:-1][turned], seen[1:][turned], strict=True):
+        found[before + 1 : here + 1] = True
+    return found
