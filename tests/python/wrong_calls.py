@@ -465,6 +465,10 @@ OBJECTS: dict[str, Callable[[], Call]] = {
         sb.add_unknown_wind,
         {"scene": blown(), "scale": 0.1, "spacing": 0.1, "duration": 0.2, "name": "gust"},
     ),
+    "add_mean": lambda: (
+        sb.add_mean,
+        {"scene": _particles(), "particles": [0, 1, 2], "weights": [1.0, 2.0, 1.0], "name": "middle", "mass": 1e-3},
+    ),
     "add_arm": lambda: (
         sb.add_arm,
         {

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import sheetbend as sb
 from sheetbend import textile
+from sheetbend.optional import MissingExtraError
 
 Call = tuple[Callable[..., Any], dict[str, Any]]
 TIMES = [0.0, 0.01, 0.02]
@@ -210,7 +211,7 @@ def tensors() -> dict[str, Callable[[], Call]]:
     """Calls of torch; none where it is not installed."""
     try:
         import sheetbend.torch as st
-    except sb.MissingExtraError:
+    except MissingExtraError:
         return {}
     return {
         "torch.simulate": lambda: (
@@ -254,7 +255,7 @@ def arrays_of_jax() -> dict[str, Callable[[], Call]]:
     """Calls of JAX; none where it is not installed."""
     try:
         import sheetbend.jax as sj
-    except sb.MissingExtraError:
+    except MissingExtraError:
         return {}
     given = {"scene": rope(), "times": TIMES, "solver": STEP, "values": {"rope_EI": 1e-3}, "inputs": None}
     gravity = {"values": None, "inputs": {"gravity": np.array([0.0, 0.0, -9.81])}}
