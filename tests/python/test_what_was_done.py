@@ -11,7 +11,7 @@ import pytest
 import sheetbend as sb
 from pytest import approx
 from scipy.signal import butter, filtfilt
-from sheetbend.doubts.at_limits import at_limits
+from sheetbend.doubts.at_limits import _limits, at_limits
 from test_forces_fit import FORCE_NOISE, experiment, twin  # noqa: F401 - a fixture
 from test_misread import AT, SIGMA, SOLVER, TRUE, rope
 
@@ -122,6 +122,16 @@ def test_forces_at_rest_stand_at_no_limit(twin: Any) -> None:  # noqa: F811
     forces[:, 2] = np.minimum(np.linspace(-1.0, 1.0, len(forces)), 0.3)
     still = replace(e, forces=[replace(sensor, recording=replace(sensor.recording, forces=forces), sigma=FORCE_NOISE)])
     assert not list(at_limits(still))
+
+
+@pytest.mark.parametrize("noise", [5e-4, 2e-3, 4e-3])
+def test_a_pull_that_stops_stands_at_no_limit(noise: float) -> None:
+    """Rounded to 0.01 N: with less noise than that most readings at rest are the same, and the largest of all."""
+    for seed in range(20):
+        pull = np.minimum(np.linspace(0.0, 2.0, 400), 1.0) + noise * np.random.default_rng(seed).standard_normal(400)
+        assert not list(_limits(np.round(pull, 2), 0.01))
+        clipped = np.minimum(pull + 1e-3 * np.random.default_rng(seed + 20).standard_normal(400), 0.9)
+        assert [side for side, *_ in _limits(clipped, 2e-3)] == ["largest"]
 
 
 def hung(turned: float = 0.0, farther: float = 0.0, **numbers: Any) -> sb.Scene:

@@ -54,9 +54,11 @@ def _limits(x: Array, sigma: float) -> Iterator[tuple[str, float, int]]:
         noise = math.sqrt(white_variance(x[:-2][free], x[1:-1][free], x[2:][free]))
         if noise <= NOISY * sigma:
             continue
-        alike = float(np.diff(values).min()) / (2.0 * math.sqrt(math.pi) * noise)  # chance that two readings agree
+        step = float(np.diff(values).min())
+        own = math.sqrt(max(noise**2 - step**2 / 6.0, 1e-6 * noise**2))  # without what a ramp that is rounded adds
+        alike = math.erf(step / (2.0 * math.sqrt(2.0) * own))  # chance that a force at rest reads the same again
         longest, other = (_longest(x, x == limit), _longest(x, x != limit))
-        if longest >= LEAST and longest > LONGER * other and min(alike, 1.0) ** (longest - 1) < CHANCE:
+        if longest >= LEAST and longest > LONGER * other and alike ** (longest - 1) < CHANCE:
             yield side, float(limit), int(np.count_nonzero(x == limit))
 
 
