@@ -124,6 +124,13 @@ def test_forces_at_rest_stand_at_no_limit(twin: Any) -> None:  # noqa: F811
     assert not list(at_limits(still))
 
 
+def test_a_log_that_is_zero_where_nothing_touches_stands_at_no_limit() -> None:
+    for seed in range(20):
+        push = np.maximum(np.sin(np.linspace(0.0, 12.0, 600)), 0.0)
+        read = np.where(push > 0.0, push + 2e-3 * np.random.default_rng(seed).standard_normal(600), 0.0)
+        assert not list(_limits(np.maximum(read, 0.0), 2e-3))
+
+
 @pytest.mark.parametrize("noise", [5e-4, 2e-3, 4e-3])
 def test_a_pull_that_stops_stands_at_no_limit(noise: float) -> None:
     """Rounded to 0.01 N: with less noise than that most readings at rest are the same, and the largest of all."""

@@ -49,6 +49,8 @@ def _limits(x: Array, sigma: float) -> Iterator[tuple[str, float, int]]:
     if len(values) < LEAST:
         return
     for side, limit in (("smallest", values[0]), ("largest", values[-1])):
+        if limit == 0.0:  # a log that is set to zero where nothing touches
+            continue
         inside = np.concatenate([[False], x == limit, [False]])
         free = ~(inside[1:-3] | inside[2:-2] | inside[3:-1])
         noise = math.sqrt(white_variance(x[:-2][free], x[1:-1][free], x[2:][free]))
