@@ -140,6 +140,7 @@ NUMBERS = {
     "4.1 curved binary": (ints(3, 0, 0) + longs(8), ints(3, 0, 1) + longs(8), "Mesh.SaveParametric"),
     "4.1 size binary": (b"\n4.1 1 8\n", b"\n4.1 1 1\n", "does not begin as Gmsh files do"),
     "2.2 values binary": (b"\n0\n1\n8\n", b"\n0\n1\n9999999999\n", LESS),
+    "2.2 name binary": (b"$EndMeshFormat\n", b"$EndMeshFormat\n$" + 2**15 * b"a ", "where a section begins"),
     "4.1 words binary": (b"$NodeData\n1\n", b"$NodeData\nx\n", "has no count where one belongs"),
 }
 

@@ -8,7 +8,6 @@ Section 9.1 of Gmsh's manual (MSH file format) and its appendices on versions 2 
 from __future__ import annotations
 
 import contextlib
-import re
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -21,7 +20,7 @@ from ..errors import MeshError
 from ..files.door import EXPANSION, ROOM
 from ..files.memory import in_words
 
-_SECTION = re.compile(rb"^\$(.*)\n", re.MULTILINE)
+_LONGEST = 80  # characters of the name of a section
 _NODE = np.dtype([("number", "<i4"), ("x", "<f8", (3,))])  # of binary files before 4.1
 _CORNERS = {
     1: 2, 2: 3, 3: 4, 4: 4, 5: 8, 6: 6, 7: 5, 8: 3, 9: 6, 10: 9, 11: 10, 12: 27, 13: 18, 14: 14, 15: 1, 16: 8, 17: 20,
@@ -37,14 +36,24 @@ def check_counts(path: Path) -> None:
         MeshError: a count is not what follows it, an element has an order above 2, or the table of the nodes would
             take more than `ROOM` and more than `EXPANSION` times the size of the file.
     """
-    content = path.read_bytes()
     with path.open("rb") as file, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # older NumPy only warns of text that is no number
         version, text, size = _head(path, file)
-        form = _Form(path, file, len(content), version, text, size)
-        for match in _SECTION.finditer(content):
-            file.seek(match.end())
-            _check(form, match[1].decode(errors="replace").strip())
+        _skip_section(file, "MeshFormat")
+        form = _Form(path, file, path.stat().st_size, version, text, size)
+        for line in iter(file.readline, b""):
+            name = line.decode(errors="replace").strip()
+            if name and (name[0] != "$" or len(name) > _LONGEST):  # meshio colors names in quadratic time
+                raise form.wrong("has something else where a section begins", repr(name[:_LONGEST]))
+            if name:
+                _check(form, name[1:].strip())
+                _skip_section(file, name[1:].strip())
+
+
+def _skip_section(file: BinaryIO, section: str) -> None:
+    for line in file:
+        if b"$End" in line and line.decode(errors="replace").strip() == f"$End{section}":
+            return
 
 
 def _check(form: _Form, section: str) -> None:
