@@ -231,6 +231,14 @@ def solids(folder: Path) -> list[Files]:
         for name, form, mesh in written:
             meshio.write(folder / name, mesh, file_format=form)
             found.append({name: (folder / name).read_bytes()})
+        places = {"gmsh:dim_tags": np.full((len(box.vertices), 2), (3, 2)), "moved": box.vertices}
+        full = meshio.Mesh(box.vertices, cells, places, data | {"stress": tags}, {"body": np.array([2, 3])})
+        for version, binary, mesh in (
+            ("2.2", False, grouped), ("4.0", True, plain), ("4.0", False, plain), ("4.1", True, full),
+            ("4.1", False, plain),
+        ):  # fmt: skip
+            meshio.gmsh.write(folder / "a.msh", mesh, version, binary)
+            found.append({"a.msh": (folder / "a.msh").read_bytes()})
     return found
 
 

@@ -98,7 +98,7 @@ def test_files_that_are_no_solid(tmp_path):
         sb.mesh.read_solid(surface)
     broken = tmp_path / "broken.msh"
     broken.write_text("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 2")
-    with pytest.raises(sb.MeshError, match="cannot be read"):
+    with pytest.raises(sb.MeshError, match="holds less than its counts say"):
         sb.mesh.read_solid(broken)
     with pytest.raises(sb.MeshError, match="no file"):
         sb.mesh.read_solid(tmp_path / "missing.msh")
@@ -109,28 +109,61 @@ def test_files_that_are_no_solid(tmp_path):
 LARGEST = b"\xff\xff\xff\x7f"
 
 
-@pytest.mark.parametrize(
-    ("version", "binary", "old", "new"),
-    [
-        ("2.2", True, b"\n8\n", b"\n4294967296\n"),
-        ("2.2", False, b"\n8 ", b"\n2147483647 "),
-        ("4.0", True, b"\x08\x00\x00\x00" + sb.mesh.bricks((0.2, 0.1, 0.1), (1, 1, 1)).vertices[7].tobytes(), LARGEST),
-        ("4.1", True, b"\x07" + bytes(7) + b"\x08", b"\x07\x00\x00\x00\x01"),
-        ("4.1", False, b"\n8\n", b"\n4294967296\n"),
-    ],
+def longs(*numbers: int) -> bytes:
+    return np.array(numbers, dtype="<u8").tobytes()
+
+
+def ints(*numbers: int) -> bytes:
+    return np.array(numbers, dtype="<i4").tobytes()
+
+
+TABLE, LESS, SUM = (
+    "nodes: have numbers whose table takes",
+    "holds less than its counts say",
+    "as many nodes or elements",
 )
-def test_a_number_of_a_node_asks_for_no_memory(tmp_path, version, binary, old, new):
+NUMBERS = {
+    "2.2 binary": (b"$Nodes\n8\n", b"$Nodes\n4294967296\n", LESS),
+    "2.2": (b"\n8 ", b"\n2147483647 ", TABLE),
+    "4.0 binary": (ints(8) + sb.mesh.bricks((0.2, 0.1, 0.1), (1, 1, 1)).vertices[7].tobytes(), LARGEST, TABLE),
+    "4.1 binary": (longs(7, 8), longs(7 + 2**32), TABLE),
+    "4.1": (b"\n8\n", b"\n4294967296\n", TABLE),
+    "4.1 odd binary": (b"\n4.1 1 8\n", b"\n4.\x7f 1 8\n", None),  # meshio takes it for 4.1
+    "4.1 nodes binary": (longs(1, 8, 1, 8), longs(1, 41996, 1, 8), SUM),
+    "4.1 nodes": (b"\n1 8 1 8\n", b"\n1 41996 1 8\n", SUM),
+    "4.0 nodes": (b"$Nodes\n1 8\n", b"$Nodes\n1 16711692\n", SUM),
+    "4.1 blocks binary": (b"$Elements\n" + longs(1), b"$Elements\n" + longs(2**40), LESS),
+    "4.1 block binary": (ints(5) + longs(1), ints(5) + longs(2**33), LESS),
+    "4.1 block": (b" 5 1\n", b" 5 8589934592\n", LESS),
+    "2.2 elements binary": (ints(5, 1, 2), ints(5, 2**31 - 1, -9), "negative count of tags"),
+    "2.2 kind binary": (ints(5, 1, 2), ints(500, 1, 2), "of a kind that is not read"),
+    "4.1 curved binary": (ints(3, 0, 0) + longs(8), ints(3, 0, 1) + longs(8), "Mesh.SaveParametric"),
+    "4.1 size binary": (b"\n4.1 1 8\n", b"\n4.1 1 1\n", "does not begin as Gmsh files do"),
+    "2.2 values binary": (b"\n0\n1\n8\n", b"\n0\n1\n9999999999\n", LESS),
+    "2.2 name binary": (b"$EndMeshFormat\n", b"$EndMeshFormat\n$" + 2**15 * b"a ", "where a section begins"),
+    "4.1 words binary": (b"$NodeData\n1\n", b"$NodeData\nx\n", "has no count where one belongs"),
+}
+
+
+@pytest.mark.parametrize("case", NUMBERS)
+def test_numbers_of_a_gmsh_file_ask_for_no_memory(tmp_path, case):
     """Some 2 kB that named node 4,294,967,296 took 32 GB."""
     meshio = pytest.importorskip("meshio")
+    (old, new, words), version, binary = NUMBERS[case], case.split()[0], case.endswith("binary")
     box, path = sb.mesh.bricks((0.2, 0.1, 0.1), (1, 1, 1)), tmp_path / "box.msh"
-    mesh = meshio.Mesh(box.vertices, [("hexahedron", box.elements)])
+    values = {"heat": np.zeros(8)} if b"Data" in old or b"\n1\n8" in old else {}
+    mesh = meshio.Mesh(box.vertices, [("hexahedron", box.elements)], values)
     meshio.gmsh.write(path, mesh, fmt_version=version, binary=binary)
     content = path.read_bytes()
     assert old in content and len(sb.mesh.read_solid(path).vertices) == 8
-    damaged = content.replace(old, new + old[len(new) :] if binary else new, 1)
+    changed = content.replace(old, new + old[len(new) :] if binary and b"\n" not in old else new, 1)
+    if words is None:
+        path.write_bytes(changed)
+        assert len(sb.mesh.read_solid(path).vertices) == 8
+        changed, words = changed.replace(longs(7, 8), longs(7, 8 + 2**32)), TABLE
     for end in (b"\n",) if binary else (b"\n", b"\r\n"):
-        path.write_bytes(damaged.replace(b"\n", end))
-        with pytest.raises(sb.MeshError, match="nodes: have numbers whose table takes"):
+        path.write_bytes(changed.replace(b"\n", end))
+        with pytest.raises(sb.MeshError, match=words):
             sb.mesh.read_solid(path)
 
 

@@ -15,7 +15,7 @@ from ..errors import MeshError
 from ..files.door import note, reading
 from ..files.units import METERS
 from ..optional import require
-from .gmsh_nodes import check_nodes
+from .gmsh_counts import check_counts
 from .solid_mesh import SolidMesh
 
 FORMATS = {".msh": "gmsh", ".vtk": "vtk", ".vtu": "vtu", ".inp": "abaqus", ".mesh": "medit"}
@@ -52,7 +52,7 @@ def _mesh(path: Path, meters: float) -> SolidMesh:
     if not path.is_file():
         raise MeshError("path", "is no file", str(path), "check the path; it starts at the working directory")
     if path.suffix.lower() == ".msh":
-        check_nodes(path)
+        check_counts(path)
     content = _load(path)
     blocks: dict[str, list[Any]] = {}
     for block in content.cells:
