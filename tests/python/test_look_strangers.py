@@ -96,6 +96,34 @@ def test_a_towel_that_hangs_in_folds_is_as_large_as_its_rows(tmp_path: Path) -> 
     assert {name for given in cloth["set"] for name in given["markers"]} == {"m0", "m5"}
 
 
+def gathered_above(frames: int = 301) -> np.ndarray:
+    """A towel of 0.4 x 0.3 m in two hands that are near each other: folded at its upper edge, open at its lower one."""
+    u, v = (a.ravel() for a in np.meshgrid(0.1 * np.arange(5), 0.1 * np.arange(3, -1, -1)))
+    t, s = np.arange(frames)[:, None] / RATE, np.linspace(0.0, 0.4, 401)
+    slope = 0.03 * np.pi / 0.4 * np.cos(np.pi * s / 0.4)  # of its rows, which sag alike
+    x = np.empty((frames, len(u), 3))
+    for height in np.unique(v):
+        own = v == height
+        angle = (1.4 * height + 0.02 * np.sin(4.0 * t)) * np.cos(2.0 * np.pi * s / 0.4)
+        level = np.cumsum(1e-3 * np.sqrt(1.0 - slope**2) * np.stack([np.cos(angle), np.sin(angle)]), axis=2)
+        level = (level - level[..., 200:201])[..., np.round(1e3 * u[own]).astype(int)]
+        swing = 0.1 * (0.3 - height) * np.sin(5.0 * t)
+        sag = 0.03 * np.sin(np.pi * u[own] / 0.4)
+        x[:, own] = np.stack([level[0], level[1] + swing, 1.0 + height - sag + 0.0 * t], axis=2)
+    return x
+
+
+def test_a_towel_that_is_gathered_above_has_straight_rows(tmp_path: Path) -> None:
+    """It was drafted 0.334 m high, with its outer columns 30 mm above the middle one, and the places of markers are
+    exact to a fit: sizes of a simulated towel came out 1.3 and 0.7 % wrong, "identified" to 0.3 %."""
+    _, content = drafted(tmp_path, gathered_above())
+    (cloth,) = content["scene"]["cloth"]
+    true = grid(5, 4, 0.1, 0.1) + np.array([0.0, 0.3])
+    assert np.abs([cloth["markers"][f"m{k}"] for k in range(20)] - true).max() < 4e-3
+    assert cloth["mesh"]["width"] == pytest.approx(0.4, rel=0.005)
+    assert cloth["mesh"]["height"] == pytest.approx(0.3, rel=0.015)
+
+
 def test_a_cloth_that_one_corner_holds(tmp_path: Path) -> None:
     """A free corner was taken for a second hand, because the row between them is not straight."""
     flat = grid(5, 5, 0.1, 0.1)

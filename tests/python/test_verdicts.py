@@ -209,10 +209,15 @@ def test_held_out_motion_that_is_missed_by_more_than_itself_is_a_doubt() -> None
     assert not verdicts(right) & set(UNSOUND) and code_of([right.result], False) == Code.DONE
     # at rest there is no motion to miss: what is left is noise
     rows = [replace(row, motion=2 * SIGMA, held_out=3 * SIGMA) for row in wrong.result.recordings]
-    assert held_out_motion(problem_of(e), wrong.comparisons, rows) == {}
+    assert held_out_motion(problem_of(e), wrong.comparisons, rows, interrupted=False) == {}
     # a model that moves where the recording hardly does: a cloth in a wind of the wrong sign was "identified"
     rows = [replace(row, motion=2 * SIGMA, held_out=30 * SIGMA) for row in rows]
-    assert "missed by 1500 % of the motion" in held_out_motion(problem_of(e), wrong.comparisons, rows)["rope_EI"]
+    found = held_out_motion(problem_of(e), wrong.comparisons, rows, interrupted=False)
+    assert "missed by 1500 % of the motion" in found["rope_EI"]
+    # after Ctrl-C pieces start from the others' mean: masses of a triple pendulum were doubtful, then identified
+    for predict, doubted in {"window": False, "mean": True}.items():
+        pieces = [replace(c, experiment=replace(c.experiment, predict=predict)) for c in wrong.comparisons]
+        assert ("rope_EI" in held_out_motion(problem_of(e), pieces, rows, interrupted=True)) == doubted
 
 
 def test_a_file_of_an_earlier_version_still_loads(tmp_path) -> None:

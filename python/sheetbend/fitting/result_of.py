@@ -83,7 +83,7 @@ def result_of(
     errors = _recordings(reached, conclusion, comparisons, left_out, corrected)
     stopped, ahead = unfinished(problem, best, judged)
     missed = unexplained(problem, comparisons, judged.autocorrelation_time, at.u)
-    contradicted = _contradicted(reached, conclusion, comparisons, errors) | missed | stopped
+    contradicted = _contradicted(reached, conclusion, comparisons, errors, interrupted) | missed | stopped
     estimates, limit = at_the_limit(doubtful(judged.estimates, contradicted, missed), at.refits, parameters, at.u)
     values = conclusion.values | parameters.to_physical(limit)
     each = every_end(reached.ends, found.raced)
@@ -158,7 +158,11 @@ def _recordings(
 
 
 def _contradicted(
-    reached: Reached, conclusion: Conclusion, comparisons: Sequence[Comparison], errors: Sequence[RecordingFit]
+    reached: Reached,
+    conclusion: Conclusion,
+    comparisons: Sequence[Comparison],
+    errors: Sequence[RecordingFit],
+    interrupted: bool,
 ) -> dict[str, str]:
     """By parameter, what other data, other starts, and other parts of the data ask for."""
     problem, best = reached.problem, reached.best
@@ -166,7 +170,7 @@ def _contradicted(
         Elsewhere(m.cost - best.cost, problem.parameters.to_physical(m.u), "another start") for m in reached.ends[1:]
     ]
     return (
-        held_out_motion(problem, comparisons, errors)
+        held_out_motion(problem, comparisons, errors, interrupted)
         | elsewhere(problem, conclusion.judged, best.cost, [*other_starts, *conclusion.lower])
         | conclusion.contradicted
     )

@@ -149,7 +149,9 @@ def _of_stiffness(sheets: Sequence[Sheet]) -> list[str]:
     if pulls:
         said.append(
             "how much the cloth is stretched: its flat size along warp and weft is fitted beside the tension, with a "
-            "prior of 1 % about what the markers show. Give the sd of your own measurement where you have one"
+            "prior of 1 % about what the markers show. Give the sd of your own measurement where you have one. Both "
+            "sizes rest on the places of the markers below, which a fit takes as exact: where these bend rows by 1 %, "
+            "a size may be off by as much, outside its interval"
         )
         said.append(
             f"the stiffness in tension at the start: warp and shear begin at a guess, and {joined(pulls)} "

@@ -21,6 +21,7 @@ NEAREST = 0.8  # of the markers are the nearest ones of the next row to those be
 WIDEST = 2.0  # times the median of all: how wide a gap is at most
 FILLED = 0.8  # of the places in rows and columns have a marker
 SAME = 0.03  # of a distance, in the median: closer layouts are the same, and the first, from all distances, is better
+BENT = 0.01  # of the distances between neighbors, rms: a layout that is farther off them bends straight rows
 
 
 def in_rows(apart: Array, flat: Array) -> Array | None:
@@ -32,7 +33,7 @@ def in_rows(apart: Array, flat: Array) -> Array | None:
     Args:
         apart: (markers, markers) m, the largest distance of every two over time.
     """
-    best, least = None, LONGER
+    best, least, near = None, LONGER, np.zeros(apart.shape, dtype=bool)
     for cells in (*_shown(flat), *_numbered(len(apart))):
         layout = _laid_out(cells, apart)
         if layout is None:
@@ -40,14 +41,16 @@ def in_rows(apart: Array, flat: Array) -> Array | None:
         over = np.linalg.norm(layout[:, None] - layout[None], axis=2) + np.eye(len(apart))
         longest = float((apart / over).max())
         if longest < least:
-            best, least = layout, longest
-    return None if best is None or _alike(best, flat) else best
+            best, least, near = layout, longest, np.abs(cells[:, None] - cells).sum(axis=2) == 1
+    return None if best is None or _alike(best, flat, near, apart) else best
 
 
-def _alike(layout: Array, flat: Array) -> bool:
-    """Whether two layouts (markers, 2) m have the same distances."""
+def _alike(layout: Array, flat: Array, near: Array, apart: Array) -> bool:
+    """Whether two layouts (markers, 2) m have the same distances, and the second one keeps those between neighbors: far
+    distances across a cloth that is gathered at its upper edge are short, and bend its rows."""
     one, other = (np.linalg.norm(x[:, None] - x[None], axis=2) + np.eye(len(x)) for x in (layout, flat))
-    return float(np.median(np.abs(other / one - 1.0))) < SAME
+    off, bent = (float(np.sqrt(np.mean((x[near] / apart[near] - 1.0) ** 2))) for x in (one, other))
+    return float(np.median(np.abs(other / one - 1.0))) < SAME and not bent > max(BENT, 2.0 * off)
 
 
 def _shown(flat: Array) -> Iterator[Array]:
