@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -27,14 +28,20 @@ def dragged(friction: float, aside: float = 0.15, slope: float = 0.0, depth: flo
 
 
 def fitted(
-    true: sb.Scene, model: sb.Scene, names: list[str], seed: int, world: sb.Solver = SOLVER, **values: float
+    true: sb.Scene,
+    model: sb.Scene,
+    free: Sequence[str | sb.Parameter],
+    seed: int,
+    world: sb.Solver = SOLVER,
+    noise: float = SIGMA,
+    **values: float,
 ) -> sb.Fit:
     particles = true.ropes["rope"].particles
     x = sb.simulate(true, TIMES, world, values=values).positions[:, particles]
-    seen = x + SIGMA * np.random.default_rng(seed).standard_normal(x.shape)
+    seen = x + noise * np.random.default_rng(seed).standard_normal(x.shape)
     recording = sb.Recording(positions=seen, times=TIMES, name="drag")
     places = [sb.on_particle(int(p)) for p in particles]
-    return sb.fit(model, recording, names, markers=places, solver=SOLVER, sigma=SIGMA)
+    return sb.fit(model, recording, free, markers=places, solver=SOLVER, sigma=noise)
 
 
 def test_a_dragged_rope_tells_its_friction_in_the_limit_of_short_substeps() -> None:
@@ -113,6 +120,15 @@ def test_the_report_tells_what_touches_and_where_motions_have_kinks() -> None:
         and "drag or damping that the model lacks is looked for to first order" in " ".join(report.split())
     )
     assert sb.FitResult.from_dict(result.to_dict()) == result
+
+
+def test_an_interval_that_leaves_the_range_of_a_friction_without_bounds_has_no_kinks() -> None:
+    """No motion has a negative friction, and the fit ends all the same."""
+    friction = sb.Parameter(name="table_friction", initial=0.29)
+    result = fitted(dragged(0.3), dragged(0.29), [friction], 1, noise=0.3).result
+    (estimate,), (kinks,) = result.estimates, result.kinks
+    assert estimate.lower < 0.0 < estimate.upper
+    assert kinks.begin == kinks.end == kinks.stick == kinks.slide == 0
 
 
 @pytest.mark.parametrize("integrator", ["bdf1", "bdf2"])

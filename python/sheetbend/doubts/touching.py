@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays.timeseries import Array
-from ..errors import DivergenceError, UnbalancedError
+from ..errors import DivergenceError, SceneError, UnbalancedError
 from ..minimum.problem import FitProblem
 from ..motion.contact_counts import ContactMode
 from ..motion.depth import too_deep
@@ -103,8 +103,8 @@ def _modes(problem: FitProblem, u: Array) -> list[Mapping[str, Array]]:
 
 
 def _runs(problem: FitProblem, u: Array) -> list[Trajectory | None]:
-    """The motion of each experiment at the substeps nearest to its frames; None where nothing can touch, or the motion
-    has no answer."""
+    """The motion of each experiment at the substeps nearest to its frames; None where nothing can touch, the motion
+    has no answer, or a value is outside its range, as an end of an interval without bounds may be."""
     found: list[Trajectory | None] = []
     for e, recording in zip(problem.experiments, problem.recordings, strict=True):
         found.append(None)
@@ -112,7 +112,7 @@ def _runs(problem: FitProblem, u: Array) -> list[Trajectory | None]:
             continue
         solver, values = replace(e.solver, extrapolate=1), problem.values_of(e, u)
         times = np.maximum(e.scene_times(recording.times, values), 0.0)
-        with suppress(DivergenceError, UnbalancedError):
+        with suppress(DivergenceError, UnbalancedError, SceneError):
             found[-1] = simulate(e.scene, np.rint(times / solver.h) * solver.h, solver, values)
     return found
 
