@@ -76,6 +76,24 @@ def test_noise_is_that_of_the_one_coordinate(tmp_path: Path) -> None:
     assert content["recording"][0]["sigma"] == pytest.approx(1e-4, rel=0.1)
 
 
+def test_noise_is_no_leap(tmp_path: Path) -> None:
+    """0.3 mm of noise was taken for a marker that is elsewhere in up to half of the frames: the motion is small."""
+    noisy = plucked(1.6) + np.random.default_rng(0).normal(0.0, 3e-4, 800)
+    _, content = drafted(table(tmp_path, noisy))
+    assert content["recording"][0].get("mend", False) is False
+    assert content["scene"]["rope"][0]["EI"] == pytest.approx(EI, rel=0.02)
+
+
+@pytest.mark.parametrize("away", [slice(500, 501), slice(300, 320)])
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+def test_a_leap_beyond_the_noise_is_found(away: slice, noise: float) -> None:
+    x = np.zeros((800, 1, 3))
+    x[:, 0, 2] = plucked(1.6) + np.random.default_rng(0).normal(0.0, noise, 800)
+    x[away, 0, 2] += 0.03
+    seen = sb.Recording(x, np.arange(800) / RATE).mended().mask[:, 0]
+    assert np.array_equal(np.flatnonzero(~seen), np.arange(800)[away])
+
+
 def test_at_is_of_one_point(tmp_path: Path) -> None:
     seen = np.random.default_rng(1).normal(0.0, 1e-3, (40, 6, 3)).cumsum(axis=0) + np.linspace(0, 1, 6)[:, None]
     sb.Recording(seen, np.arange(40) / 60, name="rope").save(tmp_path / "rope.npz")

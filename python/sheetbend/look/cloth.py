@@ -201,21 +201,21 @@ def _looked_at(
     rests = not any(hold.moves for hold in held) and not is_slung  # a grip starts where its markers are
     starts_flat = rests and not s.static and _lies_flat(s, own)
     return Sheet(
-        name,
-        own,
-        flat + low,
-        width,
-        height,
-        low,
-        origin,
-        axes,
-        held,
-        s.static,
-        is_slung,
-        starts_flat,
-        found,
-        wind,
-        ride,
+        name=name,
+        own=own,
+        flat=flat + low,
+        width=width,
+        height=height,
+        low=low,
+        origin=origin,
+        axes=axes,
+        held=held,
+        static=s.static,
+        slung=is_slung,
+        starts_flat=starts_flat,
+        slack=found,
+        wind=wind,
+        ride=ride,
     )
 
 

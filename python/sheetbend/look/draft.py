@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import RecordingError
 from . import cantilever, cloth, flight, gripped, one_point, pendulum, rope
-from .gaps import without_gaps
+from .gaps import unfilled, without_gaps
 from .seen import Seen
 from .take import Description, Measured, Take
 from .text import comment, joined, table
@@ -79,16 +79,18 @@ def draft(takes: Sequence[Take], name: str, measured: Measured | None = None) ->
 
 
 def _described(model: ModuleType, takes: Sequence[Take], measured: Measured) -> Description | None:
-    """What a model makes of the takes, from pieces of them where what moves it is lost for too long in the whole."""
+    """What a model makes of the takes, from pieces of them where what moves it is lost for too long in the whole,
+    if these show as much."""
     found: Description | None = model.describe(takes, measured)
     if found is None:
         return None
     pieces = [without_gaps(take, found.driving) for take in takes]
-    if not any(pieces):
-        return found
     shorter = [take if piece is None else piece[0] for take, piece in zip(takes, pieces, strict=True)]
-    cut: Description | None = model.describe(shorter, measured)
-    return cut and cut._replace(notes=[*(piece[1] for piece in pieces if piece is not None), *cut.notes])
+    cut: Description | None = model.describe(shorter, measured) if any(pieces) else found
+    best = found if cut is None or cut.kind != found.kind else cut  # a piece may be at rest
+    notes = [piece[1] for piece in pieces if piece is not None and best is cut]
+    gaps = [line for take in (shorter if best is cut else takes) for line in unfilled(take, found.driving)]
+    return best._replace(notes=[*notes, *best.notes], unknown=[*gaps, *best.unknown])
 
 
 def written(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -20,23 +21,15 @@ def without_gaps(take: Take, driving: Sequence[str]) -> tuple[Take, str] | None:
     Args:
         driving: markers that move something. A cubic closes what is lost of them for up to `GAP` s.
     """
-    r = take.seen.recording
-    columns = [k for k, name in enumerate(r.markers) if name in driving]
-    seen, times = r.mask[:, columns], r.times
-    lost = [
-        gap
-        for own in seen.T
-        for gap in zip(np.flatnonzero(own)[:-1], np.flatnonzero(own)[1:], strict=True)
-        if times[gap[1]] - times[gap[0]] > GAP
-    ]
-    ends = [(-1, int(np.flatnonzero(own)[0])) for own in seen.T if not own[0]]
-    ends += [(int(np.flatnonzero(own)[-1]), len(times)) for own in seen.T if not own[-1]]
-    if not lost and not ends:
+    r, times = take.seen.recording, take.seen.recording.times
+    columns, lost = _lost(take, driving)
+    if not lost:
         return None
     kept = np.ones(len(times), bool)
-    for before, after in lost + ends:
+    for before, after in lost:
         kept[before + 1 : after] = False
     borders = np.flatnonzero(np.diff(np.concatenate([[0], kept.astype(int), [0]])))
+    seen = r.mask[:, columns]
     whole = [np.flatnonzero(seen[a:b].all(axis=1)) + a for a, b in zip(borders[::2], borders[1::2], strict=True)]
     longest = max((run for run in whole if len(run)), key=lambda run: run[-1] - run[0], default=np.zeros(0, int))
     if not len(longest) or longest[-1] - longest[0] + 1 < FEWEST:
@@ -50,3 +43,34 @@ def without_gaps(take: Take, driving: Sequence[str]) -> tuple[Take, str] | None:
         f"an end: only the longest piece without, from {times[first]:.4g} to {times[last]:.4g} s, is used (`frames`)"
     )
     return replace(take, seen=part, frames=(begin + first, begin + last + 1)), said
+
+
+def unfilled(take: Take, driving: Sequence[str]) -> list[str]:
+    """That the draft of the whole take does not run, where what moves its scene is lost for too long; else nothing."""
+    columns, lost = _lost(take, driving)
+    if not lost:
+        return []
+    r, last = take.seen.recording, len(take.seen.recording.times) - 1
+    spans = [(float(r.times[max(a, 0)]), float(r.times[min(b, last)])) for a, b in lost]
+    start, stop = max(spans, key=lambda span: span[1] - span[0])
+    names = joined(r.markers[k] for k in columns)
+    they = "it is" if len(columns) == 1 else "they are"
+    return [
+        f"how it is moved by {names} while {they} lost for longer than {GAP:g} s, or at an end: in {take.file} the "
+        f"longest from {start:.4g} to {stop:.4g} s. No piece without such gaps shows as much. "
+        "This configuration does not run until they are filled in the file"
+    ]
+
+
+def _lost(take: Take, driving: Sequence[str]) -> tuple[list[int], list[tuple[int, int]]]:
+    """The columns of markers that move something; and the last frame before and the first after each time that one of
+    them is lost for longer than `GAP`, or at an end."""
+    r = take.seen.recording
+    columns = [k for k, name in enumerate(r.markers) if name in driving]
+    lost = []
+    for k in columns:
+        own = np.flatnonzero(r.mask[:, k]).tolist()
+        lost += [(a, b) for a, b in pairwise(own) if r.times[b] - r.times[a] > GAP]
+        lost += [(-1, own[0])] if own[0] else []
+        lost += [(own[-1], len(r.times))] if own[-1] < len(r.times) - 1 else []
+    return columns, lost

@@ -8,12 +8,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.timeseries import Array
+from ..arrays.timeseries import Array, noise
 
 Mask = NDArray[np.bool_]
 
 JUMP = 0.05  # of the size of what is recorded: what a step from frame to frame must go beyond the usual one
 SUDDEN = 200.0  # m/s^2, the same where frames are far apart in time
+NOISY = 8.0  # times the noise of a marker, in all three coordinates: what a leap must go beyond too
 AWAY = 0.5  # of the larger of two jumps: how large their sum is at most where a marker goes elsewhere and comes back
 
 
@@ -33,12 +34,20 @@ def leaps(times: Array, track: Array) -> Array:
 
 
 def elsewhere(times: Array, track: Array, least: float) -> Mask:
-    """(frames,) where a marker (frames, 3) is not on the path that its longest stretch without jumps belongs to."""
+    """(frames,) where a marker (frames, 3) is not on the path that its longest stretch without jumps belongs to.
+
+    Args:
+        times: (frames,) s.
+        track: (frames, 3) m.
+        least: m, of a leap of a marker without noise.
+    """
     seen = np.flatnonzero(np.isfinite(track[:, 0]))
     stray = np.zeros(len(times), dtype=bool)
     if len(seen) < 6:
         return stray
     x, t = track[seen], times[seen]
+    unsure = float(np.nan_to_num(noise(t, x[:, None])[0]))  # m, in one coordinate
+    least = max(least, NOISY * np.sqrt(3.0) * unsure)
     own, speed = leaps(t, x), np.linalg.norm(np.diff(x, axis=0), axis=1) / np.diff(t)
     bounds = [0, *(np.flatnonzero(np.linalg.norm(own, axis=1) > least) + 1).tolist(), len(seen)]
     stretches = list(pairwise(bounds))
