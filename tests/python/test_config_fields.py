@@ -57,6 +57,8 @@ WHOLE: dict[str, Any] = {
                 "poisson": 0.3,
                 "law": "neo_hookean",
                 "set": [{"name": "low", "lower": [0, 0, 0], "upper": [1, 1, 0]}],
+                "grip": [{"set": "x_min", "body": "plug"}],
+                "mean": [{"name": "tip", "set": "x_max"}],
             }
         ],
         "particles": [{"name": "a", "positions": [[0, 0, 0]]}],

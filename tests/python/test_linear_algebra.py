@@ -141,6 +141,7 @@ def test_a_missing_package_is_named_with_its_extra(package: str, monkeypatch: py
 
 SHOWN = """
 import threading
+import numpy
 from sheetbend.minimum.linear_algebra import one_blas_thread
 from threadpoolctl import threadpool_info
 
