@@ -34,7 +34,8 @@ def at_limits(e: Experiment) -> Iterator[str]:
             if readings is None or sigma is None:
                 continue
             for axis in counted:
-                x = readings[np.isfinite(readings[:, AXES.index(axis)]), AXES.index(axis)]
+                column = readings[:, AXES.index(axis)]
+                x = column[np.isfinite(column)]
                 for side, limit, count in _limits(x, sigma):
                     yield (
                         f"{count} of {len(x)} readings of the {kind} {axis} of {sensor.name} are exactly "
@@ -48,23 +49,18 @@ def _limits(x: Array, sigma: float) -> Iterator[tuple[str, float, int]]:
     values = np.unique(x)
     if len(values) < LEAST:
         return
+    starts = np.flatnonzero(np.append(True, x[1:] != x[:-1]))
+    rows = np.diff(np.append(starts, len(x)))  # how often each reading stands in a row
     for side, limit in (("smallest", values[0]), ("largest", values[-1])):
         if limit == 0.0:  # a log that is set to zero where nothing touches
             continue
-        inside = np.concatenate([[False], x == limit, [False]])
-        free = ~(inside[1:-3] | inside[2:-2] | inside[3:-1])
-        noise = math.sqrt(white_variance(x[:-2][free], x[1:-1][free], x[2:][free]))
+        at, there = x == limit, x[starts] == limit
+        noise = math.sqrt(white_variance(x, ~(at[:-2] | at[1:-1] | at[2:])))
         if noise <= NOISY * sigma:
             continue
         step = float(np.diff(values).min())
         own = math.sqrt(max(noise**2 - step**2 / 6.0, 1e-6 * noise**2))  # without what a ramp that is rounded adds
         alike = math.erf(step / (2.0 * math.sqrt(2.0) * own))  # chance that a force at rest reads the same again
-        longest, other = (_longest(x, x == limit), _longest(x, x != limit))
+        longest, other = int(rows[there].max()), int(rows[~there].max())
         if longest >= LEAST and longest > LONGER * other and alike ** (longest - 1) < CHANCE:
-            yield side, float(limit), int(np.count_nonzero(x == limit))
-
-
-def _longest(x: Array, among: Array) -> int:
-    """The length of the longest row of equal readings among some."""
-    ends = np.flatnonzero(np.concatenate([[True], (x[1:] != x[:-1]) | ~among[1:] | ~among[:-1], [True]]))
-    return int(np.diff(ends).max(initial=0)) if among.any() else 0
+            yield side, float(limit), int(np.count_nonzero(at))

@@ -11,14 +11,13 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from ..arrays.timeseries import Array
-from ..errors import SheetbendError
 from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
 from .losses_at_zero import losses_at_zero, with_losses
 from .marker_mass import marker_load
-from .tangents import Part, tangents
-from .told import Told
+from .tangents import Part
+from .told import Told, of_parts
 
 
 def missing_parts(problem: FitProblem, u: Array, i: int) -> list[Told]:
@@ -28,15 +27,7 @@ def missing_parts(problem: FitProblem, u: Array, i: int) -> list[Told]:
     made = [with_losses(e) if k == i else other for k, other in enumerate(problem.experiments)]
     theta, slots, _ = problem.known(u)
     parts = list(_parts(e, e.scene.compiled.inputs(theta[slots[i]])))
-    corrected = problem.corrections(u).get(e.name)
-    try:
-        columns = tangents(problem.of(made), u, i, {label: added for label, added, _ in parts}, corrected=corrected)
-    except SheetbendError:
-        return []
-    return [
-        Told(i, "", label, "", (0.0, ""), column, missing=says, signed=added[0] in ("velocity", "rest"))
-        for (label, added, says), column in zip(parts, columns.T, strict=True)
-    ]
+    return of_parts(problem.of(made), u, i, parts, problem.corrections(u).get(e.name))
 
 
 def _parts(e: Experiment, inputs: Array) -> Iterator[Part]:

@@ -2,42 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.timeseries import Array
-from ..errors import SheetbendError
 from ..minimum.problem import FitProblem
 from ..objects.cloth import Cloth
 from ..quantities.wording import short
-from .tangents import Input, tangents
-from .told import Told
+from ..scene.scene import Scene
+from .tangents import Part
+from .told import Told, of_parts
 
 
 def pinned_ends(problem: FitProblem, u: Array, i: int) -> list[Told]:
     """Directions of the places of single pins in the i-th experiment; none where its motion has no answer at u (free,).
     Takes one set of tangents."""
     e = problem.experiments[i]
-    added: dict[str, Input] = {}
-    says: dict[str, Callable[[float], str]] = {}
-    for name, cloth in e.scene.cloths.items():
-        for vertex in _ends(cloth, np.isin(cloth.particles, sorted(e.scene.pinned))):
+    return of_parts(problem, u, i, list(_places(e.scene)), problem.corrections(u).get(e.name))
+
+
+def _places(scene: Scene) -> Iterator[Part]:
+    for name, cloth in scene.cloths.items():
+        for vertex in _ends(cloth, np.isin(cloth.particles, sorted(scene.pinned))):
             for axis, way in enumerate("xyz"):
-                label = f"pin {vertex} of {name} along {way}"
-                added[label] = "position", np.array([3 * int(cloth.particles[vertex]) + axis]), np.ones(1)
-                says[label] = _says(name, vertex, way)
-    if not added:
-        return []
-    try:
-        columns = tangents(problem, u, i, added, corrected=problem.corrections(u).get(e.name))
-    except SheetbendError:
-        return []
-    return [
-        Told(i, "", label, "", (0.0, ""), column, missing=says[label], signed=True)
-        for label, column in zip(added, columns.T, strict=True)
-    ]
+                at = np.array([3 * int(cloth.particles[vertex]) + axis])
+                yield f"pin {vertex} of {name} along {way}", ("position", at, np.ones(1)), _says(name, vertex, way)
 
 
 def _ends(cloth: Cloth, pinned: NDArray[np.bool_]) -> list[int]:

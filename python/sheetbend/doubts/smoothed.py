@@ -18,7 +18,7 @@ from ..minimum.problem import FitProblem
 from ..optional import require
 from ..quantities.wording import short
 from ..recording.recording import Recording
-from ..statistics.gauge import RANK_TOLERANCE
+from ..statistics.least_squares import spanned
 from .told import Told
 
 FEWEST = 16  # frames
@@ -44,7 +44,8 @@ def smoothed(problem: FitProblem, u: Array, i: int) -> list[Told]:
     _, r, J = problem.evaluate(u)  # known already
     first = problem.core.first_rows[i]
     own = slice(first, first + len(frames) * len(axes))
-    q = _basis(J[own])
+    mine = J[own]
+    q = spanned(mine[:, mine.any(axis=0)])  # parameters of other motions have zeros
     left = r[own] - q @ (q.T @ r[own])
     found = []
     for label, says, filters in (
@@ -61,13 +62,6 @@ def smoothed(problem: FitProblem, u: Array, i: int) -> list[Told]:
         if best is not None:
             found.append(Told(i, "", label, "", (0.0, ""), best, slice(0, len(best)), missing=says))
     return found
-
-
-def _basis(columns: Array) -> Array:
-    """An orthonormal basis (rows, rank) of what some columns (rows, n) span. Parameters of other motions have zeros."""
-    columns = columns[:, columns.any(axis=0)]
-    q, sizes, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
-    return np.asarray(q[:, sizes > RANK_TOLERANCE * sizes.max(initial=0.0)])
 
 
 def _quiet(recording: Recording, axes: list[int], sigma: float) -> bool:

@@ -26,7 +26,7 @@ from ..scene.air import WIND
 from .draft import drafts
 from .lead import Lead, leads
 from .sensor_errors import sensor_errors
-from .tangents import tangents
+from .tangents import Part, tangents
 from .told_inputs import AXES, STEPS, gravity_turns, told_inputs
 from .told_inputs import GROUPS as OF_INPUTS
 
@@ -101,6 +101,25 @@ def told_numbers(problem: FitProblem, u: Array) -> tuple[list[Told], str]:
         return [one for i, e, r in every for one in _collect(problem, u, i, e, r, corrections.get(e.name))], ""
     except (SheetbendError, _core.NoEquilibrium) as error:
         return [], str(error)
+
+
+def of_parts(problem: FitProblem, u: Array, i: int, parts: Sequence[Part], corrected: Array | None) -> list[Told]:
+    """Directions of parts that the i-th experiment's model may lack; none where its motion has no answer at u (free,).
+    Takes one set of tangents.
+
+    Args:
+        corrected: the experiment's corrections there (`FitProblem.corrections`).
+    """
+    if not parts:
+        return []
+    try:
+        columns = tangents(problem, u, i, {label: added for label, added, _ in parts}, corrected=corrected)
+    except SheetbendError:
+        return []
+    return [
+        Told(i, "", label, "", (0.0, ""), column, missing=says, signed=added[0] in ("velocity", "rest", "position"))
+        for (label, added, says), column in zip(parts, columns.T, strict=True)
+    ]
 
 
 def told_quantities(problem: FitProblem, u: Array, i: int) -> list[tuple[str, int, float, float, Quantity]]:

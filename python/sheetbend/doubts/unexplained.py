@@ -105,7 +105,7 @@ def shares(c: Comparison, values: Values | None = None) -> Shares | None:
     beside = [_variance(measured - x[..., axes], seen, c.experiment.loss) for x in carried.values()]
     least = min(beside, default=np.inf)
     three = seen[:-2] & seen[1:-1] & seen[2:]
-    noise = max(told, white_variance(measured[:-2][three], measured[1:-1][three], measured[2:][three]))
+    noise = max(told, white_variance(measured, three))
     return Shares(left, min(moved, least), noise, int(seen.sum()) * len(axes), least < moved)
 
 
@@ -179,7 +179,7 @@ def _of_forces(c: Comparison) -> Iterator[str]:
             if len(y) < 3 or not y.size:
                 continue
             left, moved = (float(np.var(each, axis=0).sum()) for each in (y - x, y))
-            noise = max(sigma**2 * y.shape[1], white_variance(y[:-2], y[1:-1], y[2:]))
+            noise = max(sigma**2 * y.shape[1], white_variance(y))
             if left > NOISY * noise and left - noise > MOST * (moved - noise) > 0.0:
                 missed = short(100 * (left - noise) / (moved - noise), 2)
                 yield (

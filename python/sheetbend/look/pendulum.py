@@ -168,11 +168,10 @@ def _change(s: Seen, a: int, b: int) -> float:
 def _drift(s: Seen, a: int, b: int) -> float:
     """How much the distance of two markers changes, relative to it, beyond what its own noise makes by chance."""
     distance = _distance(s.recording.positions, a, b)
-    before, here, after = distance[:-2], distance[1:-1], distance[2:]
-    seen = np.isfinite(before + here + after)
+    seen = np.isfinite(distance[:-2] + distance[1:-1] + distance[2:])
     if not seen.any():
         return 0.0
-    noise = white_variance(before[seen], here[seen], after[seen])
+    noise = white_variance(distance, seen)
     by_chance = CHANCE / math.sqrt(np.isfinite(distance).sum())
     return _beyond(s, a, b, (1.0 + by_chance) * noise)
 

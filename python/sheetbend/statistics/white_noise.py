@@ -8,14 +8,15 @@ from ..arrays.timeseries import Array
 from .layout import Layout
 
 
-def white_variance(before: Array, here: Array, after: Array) -> float:
-    """Variance of the white noise that would make second differences like these, summed over the last axis where there
-    are two; 0 without any. A motion adds to it, so that it is no less than the noise's.
+def white_variance(x: Array, which: Array | slice = slice(None)) -> float:
+    """Variance of the white noise that would make the second differences of a series, summed over the last axis where
+    there are axes; 0 without any. A motion adds to it, so that it is no less than the noise's.
 
     Args:
-        before, here, after: (n,) or (n, axes), consecutive samples.
+        x: (n,), (n, axes) or (n, series, axes), consecutive samples.
+        which: of the n - 2 second differences count; of each series where there are several.
     """
-    bends = (before - 2 * here + after) ** 2
+    bends = (x[:-2] - 2 * x[1:-1] + x[2:])[which] ** 2
     return float(bends.sum() / len(bends)) / 6.0 if bends.size else 0.0
 
 
@@ -32,4 +33,4 @@ def white_noise(residuals: Array, layout: Layout, recording: int) -> float:
     series = np.stack([layout.clocks[own], layout.channel[own]])
     next_to = (np.diff(series) == 0).all(axis=0) & (np.diff(layout.frame[own]) == 1)
     three, r = next_to[:-1] & next_to[1:], residuals[own]
-    return min(1.0, white_variance(r[:-2][three], r[1:-1][three], r[2:][three])) if three.any() else 1.0
+    return min(1.0, white_variance(r, three)) if three.any() else 1.0
