@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,12 @@ KINDS: tuple[Kind, ...] = ("linear", "cubic")
 _DEFAULT_GAP_INTERVALS = 3.5
 _FEWEST_WINDOWS = 8
 _MAD_TO_STANDARD_DEVIATION = 1.4826
+
+
+def stretches(which: NDArray[Any]) -> list[tuple[int, int]]:
+    """The first entry of each row of neighboring entries (n,) that are True, and the one behind its last."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], which.astype(int), [0]]))).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
 
 
 def default_max_gap(times: Array) -> float:

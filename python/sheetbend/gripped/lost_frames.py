@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays.timeseries import stretches
 from ..recording.recording import Recording
 
 Array = NDArray[np.float64]
@@ -64,8 +65,7 @@ def _repeated(positions: Array) -> NDArray[np.bool_]:
     same = ((step == 0.0) | np.isnan(step)).all(axis=(1, 2)) & np.isfinite(step).any(axis=(1, 2))
     size = np.nan_to_num(np.linalg.norm(step, axis=2)).max(axis=1, initial=0.0)
     repeated = np.zeros(len(positions), dtype=bool)
-    edges = np.diff(np.concatenate([[0], same.astype(int), [0]]))
-    for first, last in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
+    for first, last in stretches(same):
         if first == 0 or last == len(same) or last - first + 1 >= REPEATS:
             continue  # it may rest before and after
         onward = np.nansum(step[first - 1] * step[last]) > 0.0  # not where it turns back

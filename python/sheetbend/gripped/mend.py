@@ -9,14 +9,13 @@ frozen where its numbers repeat exactly although the frame before or after shows
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.timeseries import mean_position
+from ..arrays.timeseries import mean_position, stretches
 from ..recording.leaps import elsewhere, leaps, least_leap
 from ..recording.recording import Recording
 from ..recording.relabeled import put_back
@@ -162,8 +161,7 @@ def _at_origin(track: Array, least: float) -> Mask:
     that it does not see."""
     zero = (track == 0.0).all(axis=1)
     lost, far = np.zeros(len(track), dtype=bool), np.linalg.norm(track, axis=1) > least
-    edges = np.diff(np.concatenate([[0], zero.astype(int), [0]]))
-    for first, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
+    for first, end in stretches(zero):
         lost[first:end] = any(far[i] for i in (first - 1, end) if 0 <= i < len(track))
     return lost
 
@@ -172,7 +170,7 @@ def _frozen(times: Array, track: Array) -> Mask:
     """(frames,) where the positions (frames, 3) of a moving marker repeat."""
     step = np.linalg.norm(np.diff(track, axis=0), axis=1)
     frozen, count = np.zeros(len(times), dtype=bool), 0
-    for first, last in _runs(step == 0.0):
+    for first, last in stretches(step == 0.0):
         around = step[[i for i in (first - 1, last) if 0 <= i < len(step)]]
         long = last - first + 1 >= REPEATS and times[last] - times[first] >= LASTS
         if long and (around > STEP).any():
@@ -184,7 +182,7 @@ def _frozen(times: Array, track: Array) -> Mask:
 def _resting(positions: Array) -> Mask:
     """(frames,) before and after the motion, in which every marker that is seen repeats."""
     resting = np.zeros(len(positions), dtype=bool)
-    for first, last in _runs(_same(positions)):
+    for first, last in stretches(_same(positions)):
         if first == 0 or last == len(positions) - 1:
             resting[first : last + 1] = True
     return resting
@@ -193,7 +191,7 @@ def _resting(positions: Array) -> Mask:
 def _stopped(times: Array, positions: Array) -> Mask:
     """(frames,) at the end, in which every marker repeats although the frame before shows one moving: no rope stops at
     once."""
-    stopped, runs = np.zeros(len(times), dtype=bool), list(_runs(_same(positions)))
+    stopped, runs = np.zeros(len(times), dtype=bool), stretches(_same(positions))
     if not runs or len(runs) > HELD:
         return stopped
     first, last = runs[-1]
@@ -217,12 +215,6 @@ def _least_jump(times: Array, positions: Array) -> float:
     return least_leap(times, length)
 
 
-def _runs(same: Mask) -> Iterator[tuple[int, int]]:
-    """(first, last) frames of each run of equal positions; `same` is of the steps between frames."""
-    edges = np.diff(np.concatenate([[0], same.astype(int), [0]]))
-    yield from zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True)
-
-
 def _each(recording: Recording, where: Mask, what: str) -> list[str]:
     """Words on samples (frames, markers) that are not used; markers with the same frames share a sentence."""
     names: dict[str, list[str]] = {}
@@ -242,8 +234,7 @@ def _when(recording: Recording, frames: Mask) -> str:
     if frames.sum() == 1:
         (only,) = np.flatnonzero(frames)
         return f"in frame {only} ({recording.times[only]:.4g} s)"
-    edges = np.diff(np.concatenate([[0], frames.astype(int), [0]]))
-    first, end = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    first, end = zip(*stretches(frames), strict=True)
     start, stop = recording.times[first[0]], recording.times[end[-1] - 1]
     if len(first) == 1 and end[0] == len(frames):
         return f"from frame {first[0]} ({start:.4g} s) on"

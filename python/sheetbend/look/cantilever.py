@@ -7,7 +7,7 @@ clamp follows from where the end rests.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -129,27 +129,12 @@ def _looked_at(s: Seen, base: tuple[int, ...], tip: tuple[int, ...], length: flo
 
 
 def _lines(take: Take, tip: tuple[int, ...], beam: Beam, measured: Measured) -> list[str]:
-    r, length = take.seen.recording, beam.length
-    density = 1.0 if measured.density is None else measured.density
-    lines = take.scene_lines
-    step = float(np.median(np.diff(r.times)))
-    lines += table(
-        "[solver]", {"substeps": max(1, int(np.ceil(step * 50 * beam.frequency)))}, {"substeps": "per frame"}
-    )
-    EI = density * (2 * np.pi * beam.frequency) ** 2 * length**4 / FIRST_MODE
-    rope: dict[str, Any] = {"name": "beam", "length": length, "segments": 10, "density": density, "EI": EI}
-    rope |= {"start": beam.clamp.tolist(), "direction": beam.way.tolist(), "clamp_start": beam.way.tolist()}
-    rope |= {"clamp_angles": True, "plane": beam.normal.tolist()}
-    rope |= {"loss_factor": LOSS, "loss_frequency": beam.frequency}
-    said = "kg/m" if measured.density is not None else "kg/m, not known: see above"
-    lines += table("[[scene.rope]]", rope, {"EI": "of a uniform beam of this frequency", "density": said})
+    r, length, step = take.seen.recording, beam.length, take.step
+    own = {"clamp_angles": True, "plane": beam.normal.tolist()}
+    EI, lines = model(take, measured, beam.frequency, length, beam.clamp, beam.way, 10, 50, own)
     force = 3.0 * EI / length**3 * beam.load
     axis = int(np.argmax(np.abs(force)))
-    pull: dict[str, Any] = {"name": "pull", "particles": ["beam:end"]}
-    pull["force"] = [float(force[k]) if k == axis else 0.0 for k in range(3)]
-    lines += table(
-        "[[scene.force]]", pull | {"times": [0.0, 1e-6], "factors": [1.0, 0.0]}, {"factors": "let go at once"}
-    )
+    lines += let_go([float(force[k]) if k == axis else 0.0 for k in range(3)])
     for name in ("tip_along", "tip_up"):
         lines += table(f"[scene.quantities.{name}]", {"scale": 1e-3}, {"scale": "m, of all markers' offsets"})
     lines += table("[[recording]]", {"name": "swing"} | _swing(take, beam) | _seen(take, tip, beam))
@@ -161,9 +146,9 @@ def _lines(take: Take, tip: tuple[int, ...], beam: Beam, measured: Measured) -> 
             "static": True,
         }
         still["fit"] = [beam.resting, float(r.times[-1]) + 1e-4]
-        own = _seen(take, tip, beam)
-        own["sigma"] /= np.sqrt(max(1.0, FITTED / beam.frequency / step))  # it weighs as much as the swing's frames
-        lines += table("[[recording]]", still | own, {"static": "the mean of the last frames"})
+        seen = _seen(take, tip, beam)
+        seen["sigma"] /= np.sqrt(max(1.0, FITTED / beam.frequency / step))  # it weighs as much as the swing's frames
+        lines += table("[[recording]]", still | seen, {"static": "the mean of the last frames"})
     spread = {"prior": [0.0, 0.1 * length]}
     parameters: dict[str, dict[str, Any]] = {
         "beam_EI": {},
@@ -176,6 +161,43 @@ def _lines(take: Take, tip: tuple[int, ...], beam: Beam, measured: Measured) -> 
     if measured.length is None:
         lines += table("[given.beam_length]", {"sd": LENGTH_SD}, {"sd": "relative: it counts in the intervals"})
     return lines
+
+
+def model(
+    take: Take,
+    measured: Measured,
+    frequency: float,
+    length: float,
+    clamp: Array,
+    way: Array,
+    segments: int,
+    steps: int,
+    own: Mapping[str, Any],
+) -> tuple[float, list[str]]:
+    """EI of a uniform beam of this frequency, and the lines of the scene, its solver and the beam.
+
+    Args:
+        steps: in a period.
+        own: further keys of the beam.
+    """
+    density = 1.0 if measured.density is None else measured.density
+    EI = density * (2 * np.pi * frequency) ** 2 * length**4 / FIRST_MODE
+    rope: dict[str, Any] = {"name": "beam", "length": length, "segments": segments, "density": density, "EI": EI}
+    rope |= {"start": clamp.tolist(), "direction": way.tolist(), "clamp_start": way.tolist(), **own}
+    rope |= {"loss_factor": LOSS, "loss_frequency": frequency}
+    said = "kg/m" if measured.density is not None else "kg/m, not known: see above"
+    lines = take.scene_lines
+    lines += table(
+        "[solver]", {"substeps": max(1, int(np.ceil(take.step * steps * frequency)))}, {"substeps": "per frame"}
+    )
+    lines += table("[[scene.rope]]", rope, {"EI": "of a uniform beam of this frequency", "density": said})
+    return EI, lines
+
+
+def let_go(force: list[float]) -> list[str]:
+    """The lines of a pull (3,) N at the end of the beam that ends at once."""
+    pull = {"name": "pull", "particles": ["beam:end"], "force": force, "times": [0.0, 1e-6], "factors": [1.0, 0.0]}
+    return table("[[scene.force]]", pull, {"factors": "let go at once"})
 
 
 def _swing(take: Take, beam: Beam) -> dict[str, Any]:

@@ -252,7 +252,7 @@ def _lines(
         if sheets[0].ride is not None:  # its clock is not that of the frames
             solver["h"] = 1 / 120
         else:
-            solver["substeps"] = max(1, int(np.ceil(float(np.median(np.diff(r.times))) / SUBSTEP - 1e-9)))
+            solver["substeps"] = max(1, int(np.ceil(takes[0].step / SUBSTEP - 1e-9)))
     lines += table("[solver]", solver)
     winds = [sheet.wind for sheet in sheets if sheet.wind is not None]
     if winds:

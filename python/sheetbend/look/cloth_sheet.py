@@ -59,4 +59,4 @@ class Sheet:
     @property
     def sizes(self) -> tuple[str, ...]:
         """Those of the flat fabric that its tension depends on: of what the markers show it is stretched there."""
-        return {0: (), 1: ("warp_size",), 2: ("warp_size", "weft_size")}[len(self.tension)]
+        return ("warp_size", "weft_size")[: len(self.tension)]

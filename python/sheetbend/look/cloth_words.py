@@ -138,14 +138,9 @@ def _of_size(sheets: Sequence[Sheet], held: Sequence[Hold]) -> list[str]:
 
 def _of_stiffness(sheets: Sequence[Sheet]) -> list[str]:
     said = []
-    pulls = [
-        what
-        for what, shown in {
-            "the wind's pull": any(sheet.wind is not None for sheet in sheets),
-            "its sag between its corners": any(sheet.wind is None and "shear" in sheet.tension for sheet in sheets),
-        }.items()
-        if shown
-    ]
+    windy = any(sheet.wind is not None for sheet in sheets)
+    sags = any(sheet.wind is None and "shear" in sheet.tension for sheet in sheets)
+    pulls = ["the wind's pull"] * windy + ["its sag between its corners"] * sags
     if pulls:
         said.append(
             "how much the cloth is stretched: its flat size along warp and weft is fitted beside the tension, with a "

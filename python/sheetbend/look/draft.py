@@ -16,6 +16,12 @@ from .take import Description, Measured, Take
 from .text import comment, joined, table
 
 FEWEST = 3  # markers of anything but a pendulum
+OF_ONE_MODEL = (
+    ("poses", cloth, "are for a cloth that a robot holds", "leave them out: a rope takes markers on what holds it"),
+    ("weight", rope, "hangs at a rope or cable", "leave it out; correct the masses in the configuration"),
+    ("at", one_point, "is of a beam that one marker shows", "leave it out: it says where the only marker on a beam is"),
+)
+"""What is measured for one model alone: the field, the model, what it is for, and what to do with another model."""
 
 
 @dataclass(frozen=True)
@@ -41,10 +47,11 @@ def draft(takes: Sequence[Take], name: str, measured: Measured | None = None) ->
     Raises:
         RecordingError: recordings of different markers, or one that shows nothing that a model is for.
     """
+    measured = measured or Measured()
     first = takes[0].seen
     own = [take.file for take in takes if take.seen.recording.markers != first.recording.markers]
     for model in (pendulum, flight, one_point, cantilever, cloth, gripped, rope):
-        found = _described(model, takes if not own or model is rope else takes[:1], measured or Measured())
+        found = _described(model, takes if not own or model is rope else takes[:1], measured)
         if found is not None:
             break
     else:
@@ -65,15 +72,9 @@ def draft(takes: Sequence[Take], name: str, measured: Measured | None = None) ->
     if own and model is not rope:
         fix = "give recordings of the same markers, or make one configuration for each"
         raise RecordingError("markers", f"of {joined(own)} differ from the first file's", found.kind, fix)
-    if measured is not None and measured.poses is not None and model is not cloth:
-        fix = "leave them out: a rope takes markers on what holds it"
-        raise RecordingError("poses", "are for a cloth that a robot holds, and this is", found.kind, fix)
-    if measured is not None and measured.weight is not None and model is not rope:
-        fix = "leave it out; correct the masses in the configuration"
-        raise RecordingError("weight", "hangs at a rope or cable, and this is", found.kind, fix)
-    if measured is not None and measured.at is not None and model is not one_point:
-        fix = "leave it out: it says where the only marker on a beam is"
-        raise RecordingError("at", "is of a beam that one marker shows, and this is", found.kind, fix)
+    for field, its, problem, fix in OF_ONE_MODEL:
+        if getattr(measured, field) is not None and model is not its:
+            raise RecordingError(field, f"{problem}, and this is", found.kind, fix)
     told = (*_told(takes, found.up), *found.notes)
     return written(found.kind, name, [t.file for t in takes], told, found.unknown, found.lines)
 

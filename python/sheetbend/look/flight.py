@@ -161,7 +161,7 @@ def _reach(points: Array) -> float:
 def _lines(take: Take, flight: Flight, reach: float) -> list[str]:
     s, r = take.seen, take.seen.recording
     t = r.times[flight.frames]
-    step, spin = float(np.median(np.diff(r.times))), float(np.linalg.norm(flight.start["spin"]))
+    step, spin = take.step, float(np.linalg.norm(flight.start["spin"]))
     lines = take.scene_lines
     lines += table("[solver]", {"substeps": int(np.ceil(step * max(1.0 / SUBSTEP, spin / TURN)))})
     body: dict[str, Any] = {"name": "body", "mass": 1.0, "inertia": flight.inertia.tolist()} | flight.start

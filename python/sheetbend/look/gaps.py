@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..arrays.timeseries import stretches
 from .take import GAP, Take
 from .text import joined
 
@@ -28,13 +29,11 @@ def without_gaps(take: Take, driving: Sequence[str]) -> tuple[Take, str] | None:
     kept = np.ones(len(times), bool)
     for before, after in lost:
         kept[before + 1 : after] = False
-    borders = np.flatnonzero(np.diff(np.concatenate([[0], kept.astype(int), [0]])))
-    seen = r.mask[:, columns]
-    whole = [np.flatnonzero(seen[a:b].all(axis=1)) + a for a, b in zip(borders[::2], borders[1::2], strict=True)]
-    longest = max((run for run in whole if len(run)), key=lambda run: run[-1] - run[0], default=np.zeros(0, int))
-    if not len(longest) or longest[-1] - longest[0] + 1 < FEWEST:
+    whole = r.mask[:, columns].all(axis=1)
+    spans = [(a + int(own[0]), a + int(own[-1])) for a, b in stretches(kept) if len(own := np.flatnonzero(whole[a:b]))]
+    first, last = max(spans, key=lambda span: span[1] - span[0], default=(0, -1))
+    if last - first + 1 < FEWEST:
         return None
-    first, last = int(longest[0]), int(longest[-1])
     part = take.seen.of(r.piece(float(times[first]), float(times[last]) + 1e-6))
     begin = take.frames[0] if take.frames is not None else 0
     many = "is" if len(columns) == 1 else "are"

@@ -14,7 +14,7 @@ import numpy as np
 from ..arrays import timeseries
 from ..errors import RecordingError
 from ..recording.oscillation import first_frequency
-from .cantilever import FIRST_MODE, LOSS, turning
+from .cantilever import let_go, model, turning
 from .seen import Seen
 from .take import Description, Measured, Take
 from .text import table
@@ -137,8 +137,7 @@ def _given(measured: Measured) -> tuple[float, float]:
 
 def _across(s: Seen, axis: int) -> int:
     """An axis that is across the motion, and level where one is."""
-    up = int(np.argmax(np.abs(s.gravity)))
-    return next(k for k in (0, 1, 2) if k not in (axis, up))
+    return next(k for k in (0, 1, 2) if k not in (axis, s.up))
 
 
 def _lines(take: Take, measured: Measured, beam: Swing) -> list[str]:
@@ -147,21 +146,11 @@ def _lines(take: Take, measured: Measured, beam: Swing) -> list[str]:
     normal = np.cross(out, direction)  # so that direction x normal = out
     clamp = r.positions[:, 0].mean(axis=0) - beam.at * direction
     clamp[axis] = beam.rest
-    step = float(np.median(np.diff(r.times)))
-    lines = take.scene_lines
-    lines += table("[solver]", {"substeps": max(1, int(np.ceil(step * 100 * frequency)))}, {"substeps": "per frame"})
-    density = 1.0 if measured.density is None else measured.density
-    EI = density * (2 * np.pi * frequency) ** 2 * length**4 / FIRST_MODE
-    rope: dict[str, Any] = {"name": "beam", "length": length, "segments": 12, "density": density, "EI": EI}
-    rope |= {"start": clamp.tolist(), "direction": direction.tolist(), "clamp_start": direction.tolist()}
-    rope |= {"plane": normal.tolist(), "loss_factor": LOSS, "loss_frequency": frequency}
-    said = "kg/m" if measured.density is not None else "kg/m, not known: see above"
-    lines += table("[[scene.rope]]", rope, {"EI": "of a uniform beam of this frequency", "density": said})
+    own = {"plane": normal.tolist()}
+    EI, lines = model(take, measured, frequency, length, clamp, direction, 12, 100, own)
+    step = take.step
     there = (3.0 * length * beam.at**2 - beam.at**3) / (2.0 * length**3)  # of the end's deflection, under a force there
-    pull: dict[str, Any] = {"name": "pull", "particles": ["beam:end"]}
-    pull |= {"force": (3.0 * EI / length**3 * beam.load / there * out).tolist()}
-    pull |= {"times": [0.0, 1e-6], "factors": [1.0, 0.0]}
-    lines += table("[[scene.force]]", pull, {"factors": "let go at once"})
+    lines += let_go((3.0 * EI / length**3 * beam.load / there * out).tolist())
     lines += table("[scene.quantities.zero]", {"scale": 1e-3}, {"scale": "m, of the sensor's zero"})
     if beam.held:
         lines += table("[scene.quantities.clock]", {"unit": "s", "scale": step}, {"unit": "of when it is let go"})

@@ -31,6 +31,11 @@ class Take:
         return {"file": self.file, "units": self.units, "mend": mend, "frames": self.frames and list(self.frames)}
 
     @property
+    def step(self) -> float:
+        """s, the usual time from frame to frame."""
+        return float(np.median(np.diff(self.seen.recording.times)))
+
+    @property
     def scene_lines(self) -> list[str]:
         """Those of [scene]: gravity, where the file does not tell it."""
         return [] if self.seen.up_by == "file" else table("[scene]", {"gravity": self.seen.gravity.tolist()})

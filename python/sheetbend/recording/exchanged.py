@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.shortest_tree import tree
-from ..arrays.timeseries import Array
+from ..arrays.timeseries import Array, stretches
 
 FEWEST, MANY = 20, 300  # frames at least, and those that tell distances at most
 PAIRS = 10_000_000  # of markers in these frames, at most: distances then take 0.3 GB
@@ -85,14 +85,12 @@ def _pieces(x: Array, a: int, b: int, beside: list[tuple[int, int]], apart: Arra
     state[-1] = int(best[1] < best[0])
     for f in range(len(x) - 1, 0, -1):
         state[f - 1] = came[f, state[f]]
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], state, [0]])))
-    pieces = [(int(i), int(j) - 1) for i, j in zip(edges[::2], edges[1::2], strict=True)]
     return [
-        (i, j)
-        for i, j in pieces
-        if j - i + 1 < len(x)  # labels that are exchanged in all frames are not found
-        and (before := cost[0, i : j + 1].sum()) - cost[1, i : j + 1].sum() > GAIN
-        and cost[1, i : j + 1].sum() < LEFT * before
+        (i, j - 1)
+        for i, j in stretches(state)
+        if j - i < len(x)  # labels that are exchanged in all frames are not found
+        and (before := cost[0, i:j].sum()) - cost[1, i:j].sum() > GAIN
+        and cost[1, i:j].sum() < LEFT * before
     ]
 
 

@@ -64,18 +64,21 @@ def _with_names(above: list[str], header: list[str]) -> list[str]:
     return [header[0], *(f"{names[k // 3]} {name}" for k, name in enumerate(header[1:]))]
 
 
+def _told(name: str, own: str) -> str | None:
+    """The unit that the name of a column has, above the one that stands below it."""
+    if clock.unit(name) is not None and clock.unit(f"{name} [{own}]") is None:
+        return clock.unit(name)
+    return columns.without_unit(name)[1]
+
+
 def _agree(name: str, own: str) -> bool:
     """Whether the name of a column has no unit, or that which stands below it."""
-    told = columns.without_unit(name)[1]
-    if clock.unit(name) is not None and clock.unit(f"{name} [{own}]") is None:
-        told = clock.unit(name)
-    return not own or told is None or told == own
+    return not own or _told(name, own) in (None, own)
 
 
 def _with_unit(name: str, own: str) -> str:
     """The name of a column with its unit, unless it has one."""
-    told = clock.unit(name) is not None and clock.unit(f"{name} [{own}]") is None
-    return name if not own or told or columns.without_unit(name)[1] is not None else f"{name} [{own}]"
+    return name if not own or _told(name, own) is not None else f"{name} [{own}]"
 
 
 def _units(cells: list[str]) -> list[str] | None:
