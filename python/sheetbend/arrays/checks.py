@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -112,6 +113,16 @@ def check_kind(field: str, value: object, kind: type, fix: str, error: type[Inpu
     if not isinstance(value, kind):
         article = "an" if kind.__name__[0] in "AEIOU" else "a"
         raise error(field, f"must be {article} {kind.__name__}", value, fix)
+
+
+def given_by_name(field: str, given: Mapping[str, Any] | None) -> dict[str, Any]:
+    """What was given by name; nothing for None.
+
+    Raises:
+        InputError: it is no mapping.
+    """
+    check_kind(field, {} if given is None else given, Mapping, "give a mapping from names, or leave it out")
+    return dict(given or {})
 
 
 def check_positive(name: str, required: Mapping[str, float], optional: Mapping[str, float | None]) -> None:

@@ -6,9 +6,11 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..arrays.rotations import quaternions_of
 from ..errors import ConfigError
+from ..objects.body_end import attach
 from ..objects.joint_making import Joint
 from ..objects.joints import ball, cylinder, fixed, hinge, slider, universal
 from ..objects.tool import COVERED, Tool
@@ -73,6 +75,17 @@ def _start_on(tool: Tool, body: BodySection, gravity: np.ndarray) -> dict[str, n
         a[first][: body.start_poses] for a in (path.times, path.origins, quaternions_of(path.frames))
     )
     return start_of_poses(times, places, turns, gravity if body.start_falls else np.zeros(3), time=0.0)
+
+
+def fix_to_body(scene: Scene, path: str, body: str, particles: ArrayLike, what: str) -> None:
+    """Fix particles to the body that `path`.body names, as the group `what`_on_`body`.
+
+    Raises:
+        ConfigError: there is no body of this name, or it does not take them.
+    """
+    fixed_to = named_body(f"{path}.body", body, scene)
+    with located(path, "attach"):
+        attach(fixed_to, particles, name=f"{what}_on_{body}")
 
 
 def named_body(path: str, name: str, scene: Scene) -> Body:

@@ -16,13 +16,12 @@ from ..mesh import Places, TriangleMesh
 from ..mesh.places import nearest
 from ..mesh.subdivide import subdivided
 from ..mesh.through import through
-from ..objects.body_end import attach
 from ..objects.cloth import Cloth, add_cloth
 from ..objects.laws import COMPONENTS, Exponential, Law, Sinh, Spline
 from ..objects.tool import Tool
 from ..scene.scene import Scene
 from . import cloth_schema as schema
-from .bodies import named_body
+from .bodies import fix_to_body
 from .errors import located
 from .moment import Moment
 from .tools import tool_named
@@ -74,9 +73,7 @@ def build_cloth(
     for i, (grip, vertices) in enumerate(zip(section.grip, gripped, strict=True)):
         where, held_there = f"{path}.grip[{i}]", cloth.particles[vertices]
         if grip.body is not None:
-            body = named_body(f"{where}.body", grip.body, scene)
-            with located(where, "attach"):
-                attach(body, held_there, name=f"{section.name}_{grip.set}_on_{grip.body}")
+            fix_to_body(scene, where, grip.body, held_there, f"{section.name}_{grip.set}")
         elif grip.tool is None:
             _drive(scene, where, grip, moment, held_there, shape[vertices])
         else:

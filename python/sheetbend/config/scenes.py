@@ -13,12 +13,11 @@ from ..errors import ConfigError
 from ..mesh import TriangleMesh
 from ..objects.arm import add_arm, add_pendulum
 from ..objects.arm_data import Arm
-from ..objects.body_end import attach
 from ..objects.pivot import add_air_drag
 from ..objects.tool import Tool
 from ..scene.scene import Scene
 from . import scene_schema as schema
-from .bodies import add_bodies, named_body
+from .bodies import add_bodies, fix_to_body
 from .cloth_markers import seats
 from .cloths import build_cloth, placed_mesh
 from .contacts import add_contacts
@@ -155,9 +154,7 @@ def _add_particles(scene: Scene, particles: Particles, section: schema.SceneSect
             if some.drag is not None:
                 add_air_drag(scene, added, some.name, some.drag, "N s^2/m^2")
         if some.body is not None:
-            body = named_body(f"{path}.body", some.body, scene)
-            with located(path, "attach"):
-                attach(body, added, name=f"{some.name}_on_{some.body}")
+            fix_to_body(scene, path, some.body, added, some.name)
         particles.add(some.name, added.tolist())
 
 

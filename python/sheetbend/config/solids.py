@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +9,11 @@ import numpy as np
 from .. import mesh as meshes
 from ..errors import ConfigError
 from ..mesh import SolidMesh
-from ..objects.body_end import attach
 from ..objects.mean import add_mean
 from ..objects.solid import Solid, add_solid
 from ..objects.solid_clusters import cluster_boxes
 from ..scene.scene import Scene
-from .bodies import named_body
+from .bodies import fix_to_body
 from .errors import located
 from .solid_schema import SolidSection
 
@@ -38,19 +36,17 @@ def build_solid(
         ConfigError: anything inconsistent, with the path of the key.
     """
     mesh, configured = (_mesh(path, section, folder, times) for times in (finer, 1))
-    pinned = _together([_members(f"{path}.pinned", mesh, name) for name in section.pinned])
+    pinned = [_members(f"{path}.pinned", mesh, name) for name in section.pinned]
     gripped = [_members(f"{path}.grip[{i}].set", mesh, grip.set) for i, grip in enumerate(section.grip)]
     fields = section.model_dump(exclude=_ELSEWHERE, exclude_none=True)
     with located(path, section.name):
         clusters = None if section.clusters is None else cluster_boxes(mesh, section.clusters)
-        held = _together([pinned, *gripped])
+        held = np.unique(np.concatenate([np.zeros(0, dtype=int), *pinned, *gripped]))
         solid = add_solid(scene, mesh, section.name, clusters=clusters, held=held, **fields)
-        if len(pinned):
-            scene.pin(solid.particles[pinned])
+        for vertices in pinned:
+            scene.pin(solid.particles[vertices])
     for i, (grip, vertices) in enumerate(zip(section.grip, gripped, strict=True)):
-        body = named_body(f"{path}.grip[{i}].body", grip.body, scene)
-        with located(f"{path}.grip[{i}]", "attach"):
-            attach(body, solid.particles[vertices], name=f"{section.name}_{grip.set}_on_{grip.body}")
+        fix_to_body(scene, f"{path}.grip[{i}]", grip.body, solid.particles[vertices], f"{section.name}_{grip.set}")
     means: dict[str, int] = {}
     for i, mean in enumerate(section.mean):
         vertices = _members(f"{path}.mean[{i}].set", mesh, mean.set)
@@ -73,10 +69,6 @@ def _mesh(path: str, section: SolidSection, folder: Path, finer: int) -> SolidMe
                 raise ConfigError(f"{path}.set[{i}]", "has no vertex", chosen.name, fix)
             sets[chosen.name] = inside
         return SolidMesh(mesh.vertices, mesh.elements, sets)
-
-
-def _together(vertices: Sequence[np.ndarray]) -> np.ndarray:
-    return np.unique(np.concatenate([np.zeros(0, dtype=int), *vertices]))
 
 
 def _members(path: str, mesh: SolidMesh, name: str) -> np.ndarray:

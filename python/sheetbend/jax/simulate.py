@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import check_kind
+from ..arrays.checks import given_by_name
 from ..errors import InputError, choices
 from ..motion.core_terms import substeps
 from ..motion.rollouts import Rollouts
@@ -51,11 +51,10 @@ def simulate(
             are found while the program runs; JAX then raises its own error with the package's message.
     """
     check_scene(scene)
-    for field, given in (("values", values), ("inputs", inputs)):
-        check_kind(field, {} if given is None else given, Mapping, "give a mapping from names, or leave it out")
+    values, inputs = given_by_name("values", values), given_by_name("inputs", inputs)
     solver = Solver.given(solver)
     compiled, steps = scene.compiled, substeps(times, solver.h)
-    named, arrays = _quantities(scene, values or {}), _arrays(scene, inputs or {})
+    named, arrays = _quantities(scene, values), _arrays(scene, inputs)
     rollouts = Rollouts(scene, solver.core(compiled), steps, False, solver, replaced=tuple(arrays))
     flat = FlatInputs(compiled, rollouts, tuple(named), tuple(arrays), nodes)
     kind = jnp.result_type(float)

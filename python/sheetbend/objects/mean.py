@@ -65,9 +65,9 @@ def add_mean(
         add = scene.add_hidden if parts else scene.add_particles
         node = int(add((share @ x[:first])[None], mass)[0])
         scene.means[node] = (of, share)
-        nodes, by = [p for p, _ in some], np.zeros(MOST)
+        by = np.zeros(MOST)
         by[: len(some)] = [share / total for _, share in some]
-        nodes += [*axes, *(p for p in own.tolist() if p not in nodes)]  # to fill up the stencil, without a share
+        nodes = [*(p for p, _ in some), *axes, int(own[0])]  # filled up to six, without a share
         stencils.append([world, node, *nodes[:MOST]])
         factors.append([*by[:3], *-by[3:]])
         parts = [(node, total), *parts]

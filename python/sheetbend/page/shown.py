@@ -12,7 +12,7 @@ from ..fitting.fit import Fit
 from ..fitting.fitted_motion import fitted_positions
 from ..mesh import TriangleMesh
 from ..motion.simulate import Trajectory
-from ..pictures.body_lines import body_lines, point_masses
+from ..pictures.body_lines import body_lines, is_arm, point_masses
 from ..pictures.collider_lines import collider_lines
 from ..pictures.strain import largest_strain
 from ..recording.cloud import Cloud
@@ -147,8 +147,8 @@ def _links(scene: Scene, positions: Array) -> dict[str, Array]:
     """Constraints between two particles as lines of their own; of an arm that from its pivot to its end."""
     pairs = []
     for group in scene.groups:
-        is_arm = f"{group.name.removesuffix('_links')}_first_moment" in scene.quantities
-        pairs += [pair for pair in group.particles.tolist()[: 1 if is_arm else None] if len(pair) == 2]
+        own = group.particles.tolist()[: 1 if is_arm(scene, group.name.removesuffix("_links")) else None]
+        pairs += [pair for pair in own if len(pair) == 2]
     points = [pair for pair in pairs if not set(pair) & set(scene.directors)]
     return {f"link {a}-{b}": positions[:, [a, b]] for a, b in points}
 

@@ -36,13 +36,18 @@ def body_lines(scene: Scene, positions: Array) -> dict[str, Array]:
     return found
 
 
+def is_arm(scene: Scene, name: str) -> bool:
+    """Whether `add_arm` made what is called so."""
+    return f"{name}_first_moment" in scene.quantities
+
+
 def point_masses(scene: Scene) -> Array:
     """The particles that carry a mass with a name: those of `add_point_mass`, and the bobs of pendulums."""
     found = set()
     for t in scene.terms:
         if t.array == "mass" and np.ndim(t.index) == 0 and t.index >= 0 and len(t.factors) == 1 and not t.exponents:
             ((name, function),) = t.factors
-            is_arm = f"{name.removesuffix('_mass')}_first_moment" in scene.quantities
-            if name.endswith("_mass") and function == "identity" and t.coefficient == 1.0 and not is_arm:
+            plain = name.endswith("_mass") and function == "identity" and t.coefficient == 1.0
+            if plain and not is_arm(scene, name.removesuffix("_mass")):
                 found.add(int(t.index))
     return np.array(sorted(found), dtype=int)

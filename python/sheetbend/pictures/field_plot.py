@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..mesh import Places, TriangleMesh
 from ..optional import require
 from .drawing import ACCENT, GRAY, INK, PALE, WARM, clean, key, new_figure, panels_in, seen_points
+from .moving_shapes import up_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -180,17 +181,15 @@ def box_in_space(panel: Any, points: Array, gravity: ArrayLike) -> None:
     low, high = points.min(axis=0), points.max(axis=0)
     size = np.maximum(high - low, 0.2 * (high - low).max())
     middle = (low + high) / 2
-    down = np.asarray(gravity, dtype=float)
-    upright = int(np.abs(down).argmax()) if down.any() else 2
+    up = up_of(gravity)
     for axis, name in enumerate("xyz"):
-        half = 0.52 * size[axis]
-        flip = -1.0 if axis == upright and down[axis] > 0.0 else 1.0
+        half, flip = 0.52 * size[axis], float(up[axis]) or 1.0
         getattr(panel, f"set_{name}lim")(middle[axis] - flip * half, middle[axis] + flip * half)
         getattr(panel, f"{name}axis").set_tick_params(labelsize=7, colors=INK, pad=-1)
         getattr(panel, f"{name}axis").set_pane_color((1, 1, 1, 0))
         getattr(panel, f"{name}axis").line.set_color(GRAY)
         getattr(panel, f"set_{name}label")(f"{name} [m]", color=INK, fontsize=8, labelpad=0)
-    panel.view_init(elev=18, azim=-58, vertical_axis="xyz"[upright])
+    panel.view_init(elev=18, azim=-58, vertical_axis="xyz"[int(np.abs(up).argmax())])
     panel.set_box_aspect(size, zoom=0.9)
     for axis, name in enumerate("xyz"):
         panel.locator_params(axis=name, nbins=1 + round(2 * size[axis] / size.max()))

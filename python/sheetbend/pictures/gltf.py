@@ -47,7 +47,7 @@ def write_gltf(path: str | Path, scene: Scene, motion: Trajectory, *, radius: fl
     if path.suffix.lower() != ".glb":
         raise InputError("path", "is no binary glTF file", str(path), "give a name that ends in .glb")
     frames = chosen_frames(motion.times, MOST_FRAMES)
-    file = _File(turn_between(up_of(scene), np.array([0.0, 1.0, 0.0])))
+    file = _File(turn_between(up_of(scene.gravity), np.array([0.0, 1.0, 0.0])))
     times = file.accessor(motion.times[frames].astype("<f4"), "SCALAR", bounds=True) if len(frames) > 1 else None
     for shape in moving_shapes(scene, motion, frames):
         file.add(shape, times, radius)

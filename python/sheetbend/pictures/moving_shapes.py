@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..motion.simulate import Trajectory
@@ -95,9 +96,9 @@ def _perpendicular(vector: Array, along: Array) -> Array:
     return np.asarray(across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny))
 
 
-def up_of(scene: Scene) -> Array:
-    """(3,) the coordinate axis that points up, the nearest to against gravity; z without gravity."""
-    g = np.asarray(scene.gravity, dtype=float)
+def up_of(gravity: ArrayLike) -> Array:
+    """(3,) the coordinate axis that points up, the nearest to against gravity (3,); z without gravity."""
+    g = np.asarray(gravity, dtype=float)
     axis = int(np.abs(g).argmax()) if g.any() else 2
     up = np.zeros(3)
     up[axis] = 1.0 if g[axis] <= 0.0 else -1.0

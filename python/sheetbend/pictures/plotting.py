@@ -203,7 +203,7 @@ def plot_shapes(
         InputError: no shapes, measured ones that are not as many as simulated ones, or another number of axes.
     """
     measured, simulated = _places("measured", measured), _places("simulated", simulated)
-    rings, across = _places("rings", rings), [*some_indices("plane", plane, 3)] if is_list(plane) else []
+    rings, across = _places("rings", rings), some_indices("plane", plane, 3) if is_list(plane) else []
     if len(across) != 2:
         raise InputError("plane", "must be two axes", plane, "give two of 0, 1 and 2")
     if not is_list(names) or not all(isinstance(name, str) for name in names):

@@ -57,7 +57,7 @@ def write_usd(path: str | Path, scene: Scene, motion: Trajectory, *, radius: flo
 def _write(pxr: dict[str, Any], file: Path, scene: Scene, motion: Trajectory, radius: float | None) -> None:
     usd, geometry, sdf = pxr["Usd"], pxr["UsdGeom"], pxr["Sdf"]
     stage = usd.Stage.CreateNew(str(file))
-    up = up_of(scene)
+    up = up_of(scene.gravity)
     geometry.SetStageUpAxis(stage, geometry.Tokens.y if up[1] > 0.0 else geometry.Tokens.z)
     geometry.SetStageMetersPerUnit(stage, 1.0)
     rate = _rate(motion.times)

@@ -20,13 +20,14 @@ def start_terms(means: Mapping[int, tuple[Array, Array]], terms: Sequence[Term],
         x, v: (nodes, 3) the plain parts of positions and velocities.
     """
     found: list[Term] = []
+    moving = [t for t in terms if t.array in ("position", "velocity") and (t.factors or t.exponents)]
     for node, (particles, weights) in means.items():
         for array, plain in (("position", x), ("velocity", v)):
             off = weights @ plain[particles] - plain[node]
             found.append(Term(array, 3 * node + np.arange(3), off, ()))
-        for term in (*terms, *found):
-            if term.array in ("position", "velocity") and (term.factors or term.exponents):
-                found += _mean_of(term, node, particles, weights)
+        own = [t for term in moving for t in _mean_of(term, node, particles, weights)]
+        found += own
+        moving += own
     return found
 
 

@@ -115,9 +115,8 @@ class SceneNodes(SceneData):
 
     def _refuse_attached(self, field: str, which: Sequence[int]) -> None:
         """Refuse to hold what a body moves already."""
-        wanted = set(which)
         for body in self.bodies.values():
-            if bad := sorted(wanted & body.attached.keys()):
+            if bad := sorted(body.attached.keys() & which):
                 fix = "leave them out, or pin or drive the body"
                 raise SceneError(f"{field}.particles", f"are attached to the body '{body.name}'", bad, fix)
 

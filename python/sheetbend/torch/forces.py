@@ -11,13 +11,14 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from .. import _core
+from ..arrays.checks import given_by_name
 from ..errors import InputError
 from ..experiment.force_readings import read_at, readings_problem
 from ..motion.core_terms import divergence
 from ..motion.solver import Solver
 from ..scene.scene import Scene
 from .compiled import not_traced
-from .inputs import dtype_of, given_by_name
+from .inputs import dtype_of
 
 
 @not_traced

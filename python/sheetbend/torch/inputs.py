@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 from torch.autograd import Function
 
-from ..arrays.checks import check_kind
+from ..arrays.checks import given_by_name
 from ..errors import InputError, choices
 from ..quantities.quantities import FUNCTIONS
 from ..scene.scene import Scene
@@ -36,16 +36,6 @@ NEEDS = {
     "pressure": "scene.add_pressure(triangles, ...)",
 }
 """What gives a scene the arrays that it may lack."""
-
-
-def given_by_name(field: str, given: Mapping[str, Any] | None) -> dict[str, Any]:
-    """What was given by name; nothing for None.
-
-    Raises:
-        InputError: it is no mapping.
-    """
-    check_kind(field, {} if given is None else given, Mapping, "give a mapping from names, or leave it out")
-    return dict(given or {})
 
 
 class ParameterMap:
