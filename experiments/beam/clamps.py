@@ -10,8 +10,9 @@ import numpy as np
 import sheetbend as sb
 from scipy import sparse
 from scipy.sparse.linalg import splu
+from solid import DENSITY, POISSON, SIDE, E
 
-LENGTH, SIDE, DENSITY, E, POISSON = 0.1, 0.03, 1070.0, 3.0e5, 0.499
+LENGTH = 0.1  # m
 MU, LAMBDA = E / (2 * (1 + POISSON)), E * POISSON / ((1 + POISSON) * (1 - 2 * POISSON))
 GRAVITY = 9.81
 MESHES = ((7, 2, 2), (10, 3, 3), (14, 4, 4), (20, 6, 6))

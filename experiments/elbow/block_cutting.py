@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 
 import numpy as np
+import sheetbend as sb
 from blocks import RATE, SIDES, second_block
 from sheetbend.arrays.rotations import matrices_of
 
@@ -25,7 +26,7 @@ LEAST = 5  # of the beginning of a toss
 
 def free(x: np.ndarray, frames: np.ndarray, angles: np.ndarray) -> slice:
     """The frames of one toss that are a flight."""
-    corners = SIDES / 2 * np.array([[a, b, c] for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)])
+    corners = sb.box_corners(SIDES)
     centers, turned = second_block(x, frames, angles)
     both = [o[:, None] + np.einsum("fab,kb->fka", R, corners) for o, R in ((x, frames), (centers, turned))]
     low = np.concatenate(both, axis=1)[..., 2].min(axis=1) < ABOVE
@@ -43,32 +44,25 @@ def free(x: np.ndarray, frames: np.ndarray, angles: np.ndarray) -> slice:
 def cut(source: Mapping[str, np.ndarray]) -> tuple[Arrays, Arrays]:
     """The free flights and the whole tosses of `elbow_tosses.npz`: what flights.npz and tosses.npz hold."""
     x, angles, turns = source["position"], source["angle"], source["quaternion"][:, [1, 2, 3, 0]]
-    frames = matrices_of(turns)
-    kept, numbers, flights = [], [], [0]
-    whole, tosses, flown = [], [0], []
-    for number, (first, last) in zip(source["toss"], pairwise(source["starts"]), strict=True):
-        part = free(x[first:last], frames[first:last], angles[first:last])
-        whole.append(np.arange(first + part.start, last))
-        tosses.append(tosses[-1] + len(whole[-1]))
-        flown.append(part.stop - part.start)
-        if flown[-1] >= FEWEST:
-            kept.append(np.arange(first + part.start, first + part.stop))
-            numbers.append(number)
-            flights.append(flights[-1] + len(kept[-1]))
-    which, every = (np.concatenate([np.zeros(0, dtype=int), *parts]) for parts in (kept, whole))
+    frames, ends = matrices_of(turns), list(pairwise(source["starts"]))
+    parts = [free(x[a:b], frames[a:b], angles[a:b]) for a, b in ends]
+    whole = [np.arange(a + part.start, b) for (a, b), part in zip(ends, parts, strict=True)]
+    flown = np.array([part.stop - part.start for part in parts])
+    kept = [own[:count] for own, count in zip(whole, flown, strict=True) if count >= FEWEST]
+    which, every = (np.concatenate([np.zeros(0, dtype=int), *own]) for own in (kept, whole))
     turning = np.concatenate([np.unwrap(angles[own]) for own in whole])
     return (
         {
-            "starts": np.array(flights),
-            "toss": np.array(numbers),
+            "starts": np.cumsum([0, *map(len, kept)]),
+            "toss": source["toss"][flown >= FEWEST],
             "positions": x[which],
             "quaternions": turns[which],
             "angles": angles[which],
         },
         {
-            "starts": np.array(tosses),
+            "starts": np.cumsum([0, *map(len, whole)]),
             "toss": source["toss"],
-            "free": np.array(flown),
+            "free": flown,
             "positions": x[every].astype(np.float32),
             "quaternions": turns[every].astype(np.float32),
             "angles": turning.astype(np.float32),

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 
 import numpy as np
+import sheetbend as sb
 from sheetbend.arrays.rotations import matrices_of
 
 Arrays = dict[str, np.ndarray]
@@ -34,37 +35,30 @@ def in_hand(quaternions: np.ndarray) -> int:
 
 def cut(source: Mapping[str, np.ndarray]) -> tuple[Arrays, Arrays]:
     """The free flights and the whole tosses of `cube_tosses.npz`: what flights.npz and tosses.npz hold."""
-    corners = HALF * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    turns = source["quaternion"][:, [1, 2, 3, 0]]
-    lowest = (source["position"][:, None] + np.einsum("fab,kb->fka", matrices_of(turns), corners))[..., 2].min(axis=1)
-    starts = source["starts"]
-    kept, numbers, flights = [], [], [0]
-    whole, tosses, free = [], [0], []
-    for number, (first, last) in zip(source["toss"], pairwise(starts), strict=True):
+    corners = sb.box_corners(np.full(3, 2 * HALF))
+    x, turns = source["position"], source["quaternion"][:, [1, 2, 3, 0]]
+    lowest = (x[:, None] + np.einsum("fab,kb->fka", matrices_of(turns), corners))[..., 2].min(axis=1)
+    whole, free = [], []
+    for first, last in pairwise(source["starts"]):
         low = lowest[first:last] < ABOVE
         frames = int(low.argmax()) if low.any() else last - first
         held = in_hand(turns[first : first + frames])
-        first, frames = first + held, frames - held
-        whole.append(np.arange(first, last))
-        tosses.append(tosses[-1] + last - first)
-        free.append(frames)
-        if frames >= FEWEST:
-            kept.append(np.arange(first, first + frames))
-            numbers.append(number)
-            flights.append(flights[-1] + frames)
+        whole.append(np.arange(first + held, last))
+        free.append(frames - held)
+    kept = [own[:frames] for own, frames in zip(whole, free, strict=True) if frames >= FEWEST]
     which, every = np.concatenate(kept), np.concatenate(whole)
     return (
         {
-            "starts": np.array(flights),
-            "toss": np.array(numbers),
-            "positions": source["position"][which],
+            "starts": np.cumsum([0, *map(len, kept)]),
+            "toss": source["toss"][np.array(free) >= FEWEST],
+            "positions": x[which],
             "quaternions": turns[which],
         },
         {
-            "starts": np.array(tosses),
+            "starts": np.cumsum([0, *map(len, whole)]),
             "toss": source["toss"],
             "free": np.array(free),
-            "positions": source["position"][every].astype(np.float32),
+            "positions": x[every].astype(np.float32),
             "quaternions": turns[every].astype(np.float32),
         },
     )

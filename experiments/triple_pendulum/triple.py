@@ -142,9 +142,9 @@ def scene_of(start: np.ndarray, values: dict[str, float], law: str) -> tuple[sb.
 
 def experiment(name: str, x: np.ndarray, law: str, known: bool) -> sb.Experiment:
     """A piece; of one that is predicted, the first samples alone are data."""
-    begin = {
-        key: value * (1.0 if known else share) for (key, value), share in zip(truth(law).items(), BEGIN, strict=True)
-    }
+    begin = truth(law)
+    if not known:
+        begin = {key: value * share for (key, value), share in zip(begin.items(), BEGIN, strict=True)}
     scene, places = scene_of(np.array(STARTS[name]) + OFF, begin, law)
     seen = sb.Recording(x, np.arange(len(x)) / RATE, name=name)
     part = {"fit": (0.0, FIRST), "held_out": (FIRST, SECONDS)} if name.startswith("predicted") else {}

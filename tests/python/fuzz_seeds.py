@@ -262,14 +262,17 @@ def tables_of_many(folder: Path) -> list[Files]:
     return [dict(reversed(files.items())) for files in many(folder)]
 
 
+def drape() -> bytes:
+    points = test_whole_fabric.wavy()[::8]
+    return ("x;y\n" + "".join(f"{1e3 * x:.2f};{1e3 * y:.2f}\n" for x, y in points)).encode()
+
+
 def outlines(folder: Path) -> list[Files]:
     from PIL import Image
 
-    points = test_whole_fabric.wavy()[::8]
-    table = "x;y\n" + "".join(f"{1e3 * x:.2f};{1e3 * y:.2f}\n" for x, y in points)
     inside = np.hypot(*np.meshgrid(np.arange(48) - 23.5, np.arange(40) - 19.5)) < 15.0
     picture = Image.fromarray(np.where(inside, 40, 220).astype(np.uint8))
-    found = [{"drape.csv": table.encode()}]
+    found = [{"drape.csv": drape()}]
     for suffix, form in ((".png", "PNG"), (".jpg", "JPEG"), (".tif", "TIFF"), (".bmp", "BMP")):
         stream = io.BytesIO()
         picture.save(stream, form)
@@ -282,7 +285,7 @@ def fabric_tests(folder: Path) -> list[Files]:
     files: Files = {name: (folder / name).read_bytes() for name in pulls}
     turn = np.sin(np.linspace(0.0, 2 * np.pi, 41))
     loop = "K [1/cm];M [gf cm/cm]\n" + "".join(f"{2.5 * k:.3f};{0.05 * k:.5f}\n" for k in turn)
-    files |= {"loop.csv": loop.encode(), "drape.csv": outlines(folder)[0]["drape.csv"]}
+    files |= {"loop.csv": loop.encode(), "drape.csv": drape()}
     text = """
 [fabric]
 name = "twill"

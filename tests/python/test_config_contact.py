@@ -9,6 +9,7 @@ import pytest
 import sheetbend as sb
 from sheetbend.config import load, parse, scene_alone
 from sheetbend.config.schema import Config
+from support import refusal
 
 DRAGGED = """\
 [experiment]
@@ -66,13 +67,6 @@ def parsed(text: str) -> Config:
 
 def built(text: str) -> sb.Scene:
     return scene_alone(parsed(text))[0]
-
-
-def expect_refused(text: str, field: str, words: str) -> None:
-    with pytest.raises(sb.ConfigError) as error:
-        built(text)
-    assert error.value.field == field
-    assert words in str(error.value)
 
 
 def test_a_file_builds_the_scene_that_python_builds():
@@ -151,7 +145,8 @@ def test_a_collider_moves_at_knots_and_with_a_tool(tmp_path: Path):
     ],
 )
 def test_what_cannot_be_is_refused(old: str, new: str, field: str, words: str):
-    expect_refused(DRAGGED.replace(old, new, 1), field, words)
+    with refusal(field, words, sb.ConfigError):
+        built(DRAGGED.replace(old, new, 1))
 
 
 MARBLES = """\
@@ -206,7 +201,8 @@ def test_balls_of_a_configuration_hit_each_other():
     ],
 )
 def test_collisions_that_cannot_be_are_refused(old: str, new: str, field: str, words: str):
-    expect_refused(MARBLES.replace(old, new, 1), field, words)
+    with refusal(field, words, sb.ConfigError):
+        built(MARBLES.replace(old, new, 1))
 
 
 def test_a_tool_that_is_corrected_moves_no_collider(tmp_path: Path):

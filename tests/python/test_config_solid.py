@@ -125,10 +125,13 @@ def test_a_face_is_fixed_to_a_body(tmp_path: Path) -> None:
             {"kind": "hinge", "name": "hinge", "lower": "plate", "at": [0.0, 0.01, 0.51], "axis": [0.0, 1.0, 0.0]}
         ],
     }
-    (tmp_path / "bar.toml").write_text(
-        tomli_w.dumps({"experiment": {"name": "bar"}, "solver": SOLVER, "scene": {"solid": [given], **more}})
-    )
-    scene = config.scene_alone(config.parse(tmp_path / "bar.toml"))[0]
+
+    def made(solid: dict[str, Any]) -> sb.Scene:
+        content = {"experiment": {"name": "bar"}, "solver": SOLVER, "scene": {"solid": [solid], **more}}
+        (tmp_path / "bar.toml").write_text(tomli_w.dumps(content))
+        return config.scene_alone(config.parse(tmp_path / "bar.toml"))[0]
+
+    scene = made(given)
     bar, plate = scene.solids["bar"], scene.bodies["plate"]
     face = bar.particles[bar.mesh.sets["x_min"]]
     assert list(plate.attached) == face.tolist() and "bar_x_min_on_plate" in {g.name for g in scene.groups}
@@ -138,12 +141,8 @@ def test_a_face_is_fixed_to_a_body(tmp_path: Path) -> None:
     assert motion.positions[1, face] == approx(origin[1] + kept @ frame[1].T, abs=1e-9)
     assert frame[1, 2, 0] < -0.2  # it swings down
     for wrong, match in (({"set": "left"}, "no set"), ({"body": "none"}, "no body")):
-        changed = given | {"grip": [given["grip"][0] | wrong]}
-        (tmp_path / "bar.toml").write_text(
-            tomli_w.dumps({"experiment": {"name": "bar"}, "solver": SOLVER, "scene": {"solid": [changed], **more}})
-        )
         with pytest.raises(sb.ConfigError, match=match):
-            config.scene_alone(config.parse(tmp_path / "bar.toml"))
+            made(given | {"grip": [given["grip"][0] | wrong]})
 
 
 def test_a_weight_hangs_on_the_mean_of_a_face(tmp_path: Path) -> None:

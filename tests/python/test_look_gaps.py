@@ -51,15 +51,20 @@ def test_milliseconds_that_pass_for_seconds_are_refused() -> None:
         seen(slow)
 
 
+def hand_lost(spans: list[tuple[float, float]]) -> sb.Recording:
+    """A rope in a hand, all three markers of which are lost in spans of time, from a first s up to before another."""
+    take = rope_in_hand("body")
+    x = take.positions.copy()
+    for start, stop in spans:
+        x[(take.times >= start - 1e-9) & (take.times <= stop - 1e-9), :3] = np.nan
+    return sb.Recording(x, take.times, take.markers, name="hand")
+
+
 @pytest.mark.parametrize(("lost", "kept"), [([(1.0, 1.4)], [140, 251]), ([(0.0, 0.2), (2.2, 2.5)], [20, 220])])
 def test_a_hand_that_is_lost_for_a_while(tmp_path: Path, lost: list[tuple[float, float]], kept: list[int]) -> None:
     """The draft did not run, and NumPy warned of a mean of nothing: all three markers on the hand are behind something
     for 0.4 s, or come into view late and leave it early."""
-    take = rope_in_hand("body")
-    x = take.positions.copy()
-    for start, stop in lost:
-        x[(take.times >= start - 1e-9) & (take.times <= stop - 1e-9), :3] = np.nan
-    recording = sb.Recording(x, take.times, take.markers, name="hand")
+    recording = hand_lost(lost)
     recording.save(tmp_path / "take.npz")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -78,11 +83,8 @@ def test_a_hand_that_is_lost_for_a_while(tmp_path: Path, lost: list[tuple[float,
 def test_a_hand_that_is_lost_again_and_again(starts: np.ndarray, kind: str) -> None:
     """Pieces under 30 frames were left whole without a word, although such a draft does not run. Where the longest
     piece was the rest at the start, 0.34 s long, a rope that swings was drafted as one at rest."""
-    take = rope_in_hand("body")
-    x = take.positions.copy()
-    for start in starts:
-        x[(take.times >= start - 1e-9) & (take.times <= start + 0.13 + 1e-9), :3] = np.nan
-    found = draft([Take(seen(sb.Recording(x, take.times, take.markers, name="hand")), "take.npz")], "take")
+    recording = hand_lost([(start, start + 0.14) for start in starts])
+    found = draft([Take(seen(recording), "take.npz")], "take")
     assert found.kind == "a rope" and "frames" not in tomllib.loads(found.text)["recording"][0]
     said = [sentence for sentence in found.unknown if "a, b, c while they are lost for longer than 0.1 s" in sentence]
     assert len(said) == 1 and "does not run until they are filled" in said[0], kind
@@ -90,13 +92,11 @@ def test_a_hand_that_is_lost_again_and_again(starts: np.ndarray, kind: str) -> N
 
 def test_a_piece_that_no_model_knows(monkeypatch: pytest.MonkeyPatch) -> None:
     """The draft of the whole was dropped in silence, and the recording refused as none of a rope."""
-    take = rope_in_hand("body")
-    x = take.positions.copy()
-    x[100:140, :3] = np.nan
-    whole, describe = len(x), rope.describe
+    recording = hand_lost([(1.0, 1.4)])
+    whole, describe = len(recording.times), rope.describe
     monkeypatch.setattr(
         rope, "describe", lambda t, m: describe(t, m) if len(t[0].seen.recording.times) == whole else None
     )
-    found = draft([Take(seen(sb.Recording(x, take.times, take.markers, name="hand")), "take.npz")], "take")
+    found = draft([Take(seen(recording), "take.npz")], "take")
     assert found.kind == "a rope" and any("from 0.99 to 1.4 s" in sentence for sentence in found.unknown)
     assert not any("only the longest piece" in sentence for sentence in found.seen)

@@ -21,17 +21,17 @@ CLOTH = {"cloth_warp": 60.0, "cloth_weft": 40.0, "cloth_shear": 6.0, "cloth_bend
 CELLS, PINS = 6, [42, 48]
 
 
-def fell(seed: int, smooth: Any = None) -> sb.Experiment:
+def fell(seed: int, smooth: Any = None, times: np.ndarray = TIMES, name: str = "fall") -> sb.Experiment:
     """A rope that falls, from substeps eight times shorter."""
-    x = sb.simulate(rope(), TIMES, FINE).positions[:, AT]
+    x = sb.simulate(rope(), times, FINE).positions[:, AT]
     x = x + SIGMA * np.random.default_rng(seed).standard_normal(x.shape)
-    recording = sb.Recording(x if smooth is None else smooth(x), TIMES, name="fall")
+    recording = sb.Recording(x if smooth is None else smooth(x), times, name=name)
     markers = [sb.on_particle(k) for k in AT]
     return sb.Experiment(scene=rope(), recording=recording, markers=markers, solver=SOLVER, sigma=SIGMA)
 
 
-def low_pass(hertz: float, order: int = 2) -> Any:
-    b, a = butter(order, hertz / 50.0)
+def low_pass(hertz: float, rate: float = 100.0) -> Any:
+    b, a = butter(2, hertz / (rate / 2.0))
     return lambda x: filtfilt(b, a, x, axis=0)
 
 
@@ -62,12 +62,7 @@ def test_filtered_markers_are_named(smooth: Any, words: str) -> None:
 
 def test_recordings_that_were_filtered_alike_are_named_together() -> None:
     """Filters of other cut-offs explain most of each, and a cut-off is another part of another frame rate."""
-    low = fell(1, low_pass(6.0))
-    often = np.arange(201) / 200
-    x = sb.simulate(rope(), often, FINE).positions[:, AT]
-    x = x + SIGMA * np.random.default_rng(2).standard_normal(x.shape)
-    b, a = butter(2, 6.0 / 100.0)
-    high = replace(low, recording=sb.Recording(filtfilt(b, a, x, axis=0), often, name="often"), name="often")
+    low, high = fell(1, low_pass(6.0)), fell(2, low_pass(6.0, 200.0), np.arange(201) / 200, "often")
     found = sb.fit([low, high], parameters=tuple(TRUE)).result
     assert [w for w in found.warnings if "the markers were filtered, with a cut-off near 5.8 Hz. Check" in w]
 
