@@ -29,7 +29,7 @@ def without_gaps(take: Take, driving: Sequence[str]) -> tuple[Take, str] | None:
     kept = np.ones(len(times), bool)
     for before, after in lost:
         kept[before + 1 : after] = False
-    whole = r.mask[:, columns].all(axis=1)
+    whole = np.asarray(r.mask[:, columns].all(axis=1))
     spans = [(a + int(own[0]), a + int(own[-1])) for a, b in stretches(kept) if len(own := np.flatnonzero(whole[a:b]))]
     first, last = max(spans, key=lambda span: span[1] - span[0], default=(0, -1))
     if last - first + 1 < FEWEST:
