@@ -112,12 +112,13 @@ use_compiler_cache() {
   export CMAKE_CXX_COMPILER_LAUNCHER=ccache CCACHE_BASEDIR="$ROOT" CCACHE_NOHASHDIR=1
 }
 
-# install_sheetbend EXTRAS: builds in place of pip's throw-away directory, so that a second build compiles only what changed. For `dev` the kernels of all
-# instruction sets are compiled, which its tests compare; otherwise those for this machine.
+# install_sheetbend EXTRAS: builds in place of pip's throw-away directory, so that a second build compiles only what changed. SHEETBEND_KERNELS says which kernels
+# are compiled; without it, those for this machine. For `dev` those of all instruction sets are, which its tests compare; this also serves who asks for this machine's.
 install_sheetbend() {
-  local extras=$1 found
+  local extras=$1 kernels=${SHEETBEND_KERNELS:-machine} found
+  [[ $extras != dev ]] || kernels=all
   found=$(fingerprint)
-  if [[ -e $STAMP ]] && grep -qxE "$found ($extras|dev)" "$STAMP"; then
+  if [[ -e $STAMP ]] && grep -qxE "$found (${kernels/#machine/machine|all}) ($extras|dev)" "$STAMP"; then
     say "sheetbend is installed and up to date"
     return
   fi
@@ -129,11 +130,10 @@ install_sheetbend() {
   mapfile -t -O "${#tools[@]}" tools < <(build_requirements)
   pip install -q "${tools[@]}"
   say "building and installing sheetbend[$extras] (minutes the first time)"
-  local settings=(--config-settings build-dir="$ROOT/build/wheel")
-  [[ $extras != dev ]] || settings+=(--config-settings cmake.define.SHEETBEND_KERNELS=all)
+  local settings=(--config-settings build-dir="$ROOT/build/wheel" --config-settings cmake.define.SHEETBEND_KERNELS="$kernels")
   [[ -z ${CI:-} ]] || settings+=(--config-settings cmake.define.SHEETBEND_WERROR=ON)
   pip install -q --no-build-isolation "${settings[@]}" "${ROOT}[$extras]"
-  echo "$found $extras" >"$STAMP"
+  echo "$found $kernels $extras" >"$STAMP"
 }
 
 set_up() {
