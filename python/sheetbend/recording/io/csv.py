@@ -13,6 +13,9 @@ Long, one row per marker and frame, in any order; a missing row means not seen:
     0.00,tip,0.10,0.0,-0.02
     0.00,base,0.0,0.0,0.0
 
+Or a time and one column, what a laser or another sensor of one coordinate writes: `time,distance [mm]`. It is the z of
+a marker that stays at x = y = 0, or the axis that the name tells.
+
 The header is required and starts with `time` or `t` (s), `time_ms`, `time_us` or `time_ns`; the last three count from
 the first row. A column `frame`, or one without a name, before it is not read; without a time, the frames count at the
 `rate` of the JSON beside the file. `columns` says how markers and axes are written. Cells are separated by commas,
@@ -145,9 +148,16 @@ def _counted(path: Path, rows: list[Row]) -> Array:
 
 def _read_wide(path: Path, header: list[str], header_line: int, rows: list[Row], times: Array) -> MarkerData:
     own = [k for k, name in enumerate(header) if k and not columns.beside(name)]
-    markers, unit = columns.markers(path, header_line, [header[k] for k in own])
+    names = [header[k] for k in own]
+    if len(names) == 1:
+        marker, axis, unit = columns.alone(path, header_line, names[0])
+        markers = [marker]
+    else:
+        markers, unit = columns.markers(path, header_line, names)
     _check_times(path, rows, times)
     table = np.array([[number(path, line, cells[k]) for k in own] for line, cells in rows])
+    if len(names) == 1:
+        table = np.where(np.arange(3) == axis, table, 0.0 * table)  # nan stays nan
     metadata = {} if unit is None else {"units": unit}
     return MarkerData(without_zeros(table.reshape(len(rows), -1, 3)), times, tuple(markers), metadata=metadata)
 
