@@ -276,7 +276,7 @@ def test_strays_are_left_out_of_a_draft(tmp_path: Path) -> None:
     found, content = drafted(tmp_path, np.concatenate([x, stray], axis=1))
     (rope,) = content["scene"].get("rope", content["scene"].get("rod"))
     assert "m11" not in rope["markers"] and np.isfinite(rope["length"])
-    assert any("m11 is seen in less than a tenth of the frames" in sentence for sentence in found.seen)
+    assert any("m11 is seen in less than a fifth of the frames" in sentence for sentence in found.seen)
 
 
 def test_labels_that_are_exchanged_and_reflections(tmp_path: Path) -> None:

@@ -211,6 +211,12 @@ def _upright(take: Take, joints: list[int]) -> bool:
     if wide[normal] >= FLAT * s.apart[joints[0], joints[1]]:
         return False
     up = int(np.argmax(np.abs(down))) if s.up_by == "guess" else int(np.argmax(np.abs(s.gravity)))
+    if normal == 1 and down[2] > HANGS * s.apart[joints[0], joints[1]]:
+        fix = (
+            f"turn it over, in Python: r = sb.Recording.load('{take.file}'); "
+            "sb.Recording(r.positions * [1, -1, -1], r.times, r.markers).save('turned.csv')"
+        )
+        raise RecordingError("markers", "hang upward, if z is up, and arms are described with z up", "-z up", fix)
     if (normal, up) == (1, 2) or abs(down[up]) < HANGS * s.apart[joints[0], joints[1]]:
         return normal == 1
     axes = [3 - normal - up, normal, up]
