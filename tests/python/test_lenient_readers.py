@@ -311,3 +311,39 @@ def test_axes_without_names_are_refused(tmp_path: Path) -> None:
     (tmp_path / "take.csv").write_text("measured by hand\ntime;day\n0;1\n")
     with pytest.raises(RecordingError, match="line 1: must be a header whose first column is time"):
         Recording.load(tmp_path / "take.csv")
+
+
+@pytest.mark.parametrize(
+    ("name", "marker", "axis", "scale"),
+    [
+        ("distance", "distance", 2, 1.0),
+        ("distance [mm]", "distance", 2, 1e-3),
+        ("time_distance_mm", "time_distance", 2, 1e-3),
+        ("Laser 1 (mm)", "Laser 1", 2, 1e-3),
+        ("tip_x", "tip_x", 0, 1.0),
+        ("Auslenkung / mm", "Auslenkung", 2, 1e-3),
+    ],
+)
+def test_one_column_is_one_coordinate(tmp_path: Path, name: str, marker: str, axis: int, scale: float) -> None:
+    """The file of a laser was refused: three columns per marker."""
+    (tmp_path / "take.csv").write_text(f"time,{name}\n0,1\n0.01,2\n0.02,\n0.03,0\n")
+    got = Recording.load(tmp_path / "take.csv")
+    assert got.markers == (marker,) and got.mask[:, 0].tolist() == [True, True, False, True]
+    assert got.positions[got.mask[:, 0], 0, axis] == pytest.approx([scale, 2 * scale, 0.0])
+    assert not np.delete(got.positions[got.mask[:, 0], 0], axis, axis=1).any()
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("angle", "does not say that it is a length"),
+        ("angle [deg]", "must name a length unit"),
+        ("distance [um]", "must name a length unit"),
+        ("force_n", "must name a length unit"),
+        ("laser (V)", "must name a length unit"),
+    ],
+)
+def test_one_column_that_is_no_length_is_refused(tmp_path: Path, name: str, words: str) -> None:
+    (tmp_path / "take.csv").write_text(f"time,{name}\n0,1\n0.01,2\n")
+    with pytest.raises(RecordingError, match=words):
+        Recording.load(tmp_path / "take.csv")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 import sheetbend as sb
 from sheetbend.config import build, parse
 from sheetbend.look import Take, draft, rope, seen
+from sheetbend.look.gaps import unfilled, without_gaps
 from takes import NOISE, rope_in_hand
 
 RATE, REST = 120, 0.5
@@ -100,3 +102,13 @@ def test_a_piece_that_no_model_knows(monkeypatch: pytest.MonkeyPatch) -> None:
     found = draft([Take(seen(recording), "take.npz")], "take")
     assert found.kind == "a rope" and any("from 0.99 to 1.4 s" in sentence for sentence in found.unknown)
     assert not any("only the longest piece" in sentence for sentence in found.seen)
+
+
+def test_a_marker_that_is_never_seen_leaves_no_piece() -> None:
+    """An IndexError, where a marker that moves a rope is lost in all frames of the recording."""
+    recording = hand_lost([(0.0, 2.5)])
+    whole = Take(seen(rope_in_hand("body")), "take.npz")
+    take = replace(whole, seen=replace(whole.seen, recording=recording))
+    assert without_gaps(take, ("a", "r1")) is None
+    (said,) = unfilled(take, ("a", "r1"))
+    assert "from 0 to 2.5 s" in said

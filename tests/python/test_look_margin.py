@@ -17,6 +17,7 @@ from test_look import fitted
 
 ROOT = Path(__file__).resolve().parents[2]
 WIND = ROOT / "experiments/cloth_in_wind/data/cloth_in_wind.npz"
+TWIN = ROOT / "experiments/twin/data/twin.npz"
 HELD = ROOT / "experiments/held_cloth/data"
 
 
@@ -100,6 +101,39 @@ def test_a_margin_that_nothing_shows_is_to_be_measured_with_a_ruler(tmp_path: Pa
     said = last_line(run("new", tmp_path / "still.npz", "--output", tmp_path / "draft.toml", "--json"))
     assert any(words.startswith("how far the held edge") and "ruler" in words for words in said["unknown"])
     assert not any("held edge" in words for words in said["seen"])
+
+
+def test_a_margin_that_was_measured(tmp_path: Path) -> None:
+    """Beyond all outer rows but that beside the edge that the motion shows. Markers and origin stay where they are, and
+    nothing is left to measure there."""
+    drafts = {}
+    for name, options in {"guessed": (), "given": ("--margin", "0.03")}.items():
+        file = tmp_path / f"{name}.toml"
+        said = last_line(run("new", WIND, "--density", "0.15", "-o", file, "--json", *options))
+        drafts[name] = tomllib.loads(file.read_text())["scene"]["cloth"][0]
+    guessed, given = drafts["guessed"], drafts["given"]
+    assert given["mesh"]["margin"] == [0.03, 0.03, 0.03, 0.0]
+    assert given["mesh"]["width"] == approx(guessed["mesh"]["width"] - 0.0622, abs=1e-3)  # a marker's distance
+    places = [np.array(list(own["markers"].values())) for own in (guessed, given)]
+    shift = places[1] - places[0]
+    assert np.ptp(shift, axis=0) == approx(0.0, abs=3e-6) and places[1].min(axis=0) == approx(0.0, abs=3e-6)
+    assert any("30 mm beyond the outer ones, as given" in words for words in said["seen"])
+    assert not any("outer markers" in words for words in said["unknown"])
+    built = sb.config.build(sb.config.parse(file), tmp_path).experiments[0].scene.cloths["cloth"].mesh
+    assert np.ptp(built.material, axis=0) == approx([given["mesh"]["width"] + 0.06, given["mesh"]["height"] + 0.03])
+
+
+def test_corners_in_clips_have_a_margin_too(tmp_path: Path) -> None:
+    takes.towel(False).save(tmp_path / "towel.npz")
+    run("new", tmp_path / "towel.npz", "--margin", "0.02", "-o", tmp_path / "draft.toml")
+    (cloth,) = tomllib.loads((tmp_path / "draft.toml").read_text())["scene"]["cloth"]
+    assert len(cloth["set"]) == 2 and cloth["mesh"]["margin"] == [0.02] * 4
+
+
+def test_a_margin_that_is_none_is_refused(tmp_path: Path) -> None:
+    for file, given, words in ((WIND, "-1", "zero or more"), (TWIN, "0.02", "is of a cloth beyond")):
+        result = run("new", file, "--margin", given, "-o", tmp_path / "draft.toml")
+        assert result.exit_code == 2 and words in result.output
 
 
 @pytest.mark.slow

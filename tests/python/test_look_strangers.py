@@ -276,7 +276,7 @@ def test_strays_are_left_out_of_a_draft(tmp_path: Path) -> None:
     found, content = drafted(tmp_path, np.concatenate([x, stray], axis=1))
     (rope,) = content["scene"].get("rope", content["scene"].get("rod"))
     assert "m11" not in rope["markers"] and np.isfinite(rope["length"])
-    assert any("m11 is seen in less than a tenth of the frames" in sentence for sentence in found.seen)
+    assert any("m11 is seen in less than a fifth of the frames" in sentence for sentence in found.seen)
 
 
 def test_labels_that_are_exchanged_and_reflections(tmp_path: Path) -> None:
@@ -437,7 +437,16 @@ def test_noise_in_a_plane_is_no_camera_that_looks_askew(tmp_path: Path, arms: in
         x = bars(481, 60)[:, : arms + 1]
         x = x + np.random.default_rng(seed).normal(0.0, noise, x.shape) * np.array([1.0, 0.0, 1.0])
         found, _ = drafted(tmp_path, x, 60, 0.0)
-        assert not any("not square" in words for words in found.unknown)
+        assert not any("not square" in words or "stretches" in words for words in found.unknown)
+
+
+@pytest.mark.parametrize(("arms", "stretch"), [(1, 0.006), (2, 0.006), (3, -0.006)])
+def test_a_camera_that_stretches_one_axis_is_told(tmp_path: Path, arms: int, stretch: float) -> None:
+    """Arms of 150 to 250 mm seemed to be 1.5 mm longer along one axis, which their noise of 0.4 mm hid. The stretch
+    scatters by 0.00044 over seeds of the noise."""
+    found, _ = drafted(tmp_path, bars(481, 60)[:, : arms + 1] * np.array([1.0 + stretch, 1.0, 1.0]), 60, 4e-4)
+    (words,) = (words for words in found.unknown if words.startswith("what stretches the picture"))
+    assert float(re.search(r"divide x by ([\d.]+)", words)[1]) == pytest.approx(1.0 + stretch, abs=3 * 4.4e-4)
 
 
 def test_three_arms_before_a_camera_that_looks_askew(tmp_path: Path) -> None:

@@ -97,6 +97,10 @@ def new(
             help="Distance in m from the clamp of a beam to the only marker or laser spot on it.", show_default=False
         ),
     ] = None,
+    margin: Annotated[
+        float | None,
+        typer.Option(help="Distance in m from the outer markers of a cloth to its edge.", show_default=False),
+    ] = None,
     units: Annotated[
         str | None, typer.Option(help="Length unit of the files: m, cm, mm, in or ft.", show_default=False)
     ] = None,
@@ -130,7 +134,7 @@ def new(
 
     Example: sheetbend new take.csv --density 0.05
     """
-    measured = Measured(density, length, weight=weight, at=at)
+    measured = Measured(density, length, weight=weight, at=at, margin=margin)
     run(lambda console: _new(console, files, output, measured, units, up, markers, poses), json)
 
 
@@ -151,8 +155,9 @@ def _new(
     ):
         if given is not None and not 0 < given < float("inf"):
             raise ConfigError(option, "must be positive", given, fix)
-    if measured.weight is not None and not 0 <= measured.weight < float("inf"):
-        raise ConfigError("--weight", "must be zero or more", measured.weight, "give kg")
+    for option, given, fix in (("--weight", measured.weight, "give kg"), ("--margin", measured.margin, "give m")):
+        if given is not None and not 0 <= given < float("inf"):
+            raise ConfigError(option, "must be zero or more", given, fix)
     if is_mesh := files[0].suffix.lower() in garment.FILES:
         _check_mesh(files, measured, markers, poses)
         name = _name(files[0].stem)
@@ -184,7 +189,7 @@ def _new(
     try:
         found = draft(takes, name, measured)
     except RecordingError as error:
-        if error.field in ("length", "poses", "weight", "at"):
+        if error.field in ("length", "poses", "weight", "margin", "at"):
             raise ConfigError(f"--{error.field}", error.problem, error.got, error.fix) from error
         raise
     return _written(console, target, name, found, "the recording", f"sheetbend fit {target}")
@@ -230,6 +235,8 @@ def _check_mesh(files: list[Path], measured: Measured, markers: str | None, pose
         raise ConfigError("--weight", "is of a rope", measured.weight, "leave it out")
     if measured.at is not None:
         raise ConfigError("--at", "is of a beam", measured.at, "leave it out")
+    if measured.margin is not None:
+        raise ConfigError("--margin", "is of the markers on a cloth", measured.margin, "leave it out")
     if markers is not None:
         raise ConfigError("--markers", "are of a recording", markers, "leave them out")
 

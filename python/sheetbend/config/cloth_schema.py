@@ -10,8 +10,8 @@ from ..files.units import Length
 from .section import MOST_CELLS, Counts, Finite, Name, Pair, Section, Vector, key
 
 MESH_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "grid": (("width", "height", "nx", "ny"), ("pattern", "warp")),
-    "equilateral": (("width", "height", "nx"), ("warp",)),
+    "grid": (("width", "height", "nx", "ny"), ("pattern", "warp", "margin")),
+    "equilateral": (("width", "height", "nx"), ("warp", "margin")),
     "disk": (("radius", "rings"), ("support", "warp")),
     "file": (("file",), ("unit", "material", "texture_size", "warp", "merge")),
 }
@@ -25,6 +25,12 @@ class ClothMesh(Section):
     kind: Literal["grid", "equilateral", "disk", "file"] = key(..., "which of them")
     width: Finite | None = key(None, "of a grid or equilateral triangles, along x", "m", gt=0)
     height: Finite | None = key(None, "of a grid or equilateral triangles, along y", "m", gt=0)
+    margin: Finite | list[Finite] | None = key(
+        None,
+        "how far the cloth goes on beyond `width` and `height`, on all sides, or on the left, right, lower and upper "
+        "one; places of markers and `origin` still count from the corner of the inner rectangle",
+        "m",
+    )
     nx: int | None = key(None, "cells of a grid along x, or sides of equilateral triangles", ge=1, le=MOST_CELLS)
     ny: int | None = key(None, "cells of a grid along y", ge=1, le=MOST_CELLS)
     pattern: Literal["alternating", "crossed", "one_way"] | None = key(
@@ -56,7 +62,16 @@ class ClothMesh(Section):
         if foreign:
             fix = f"leave out what is not of: {', '.join((*needed, *optional))}"
             raise ValueError(f"of kind '{self.kind}' has no {', '.join(foreign)}|{fix}")
+        if self.margin is not None and not (len(self.margins) == 4 and min(self.margins) >= 0):
+            raise ValueError(
+                "has a margin that is no length of each side|give one number, or four: left, right, lower, upper"
+            )
         return self
+
+    @property
+    def margins(self) -> list[float]:
+        """m, on the left, right, lower and upper side."""
+        return self.margin if isinstance(self.margin, list) else [self.margin or 0.0] * 4
 
 
 class ClothLaw(Section):

@@ -176,7 +176,7 @@ def _press(scene: Scene, section: schema.Cloth, cloth: Cloth) -> None:
 
 
 def _mesh(path: str, section: schema.ClothMesh, folder: Path, finer: int) -> TriangleMesh:
-    given: dict[str, Any] = section.model_dump(exclude={"kind"}, exclude_none=True)
+    given: dict[str, Any] = section.model_dump(exclude={"kind", "margin"}, exclude_none=True)
     if section.kind == "file":
         file = folder / given.pop("file")
         if not file.is_file():
@@ -190,11 +190,15 @@ def _mesh(path: str, section: schema.ClothMesh, folder: Path, finer: int) -> Tri
         if count in given:
             given[count] *= finer
     warp = given.pop("warp", [1.0, 0.0, 0.0])
+    left, right, low, high = section.margins
+    if section.margin is not None:
+        given |= {"width": left + given["width"] + right, "height": low + given["height"] + high}
     if section.kind == "equilateral":
         mesh = meshes.equilateral(given["width"], given["height"], given["nx"])
     else:
         mesh = meshes.disk(**given) if section.kind == "disk" else meshes.grid(**{"pattern": "one_way", **given})
-    return replace(mesh, material=mesh.material @ _along_warp(f"{path}.warp", warp))
+    vertices, material = mesh.vertices - [left, low, 0.0], mesh.material - [left, low]
+    return replace(mesh, vertices=vertices, material=material @ _along_warp(f"{path}.warp", warp))
 
 
 def _along_warp(path: str, warp: list[float]) -> np.ndarray:

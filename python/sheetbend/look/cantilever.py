@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays.rigid import rigid_motion
-from ..arrays.timeseries import mean_position
+from ..arrays.timeseries import default_max_gap, interpolate, mean_position
 from ..recording.oscillation import along, dominant_direction, first_frequency
 from .line import snapped
 from .seen import Seen
@@ -96,6 +96,11 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
 
 def _looked_at(s: Seen, base: tuple[int, ...], tip: tuple[int, ...], length: float | None) -> Beam | None:
     x, t = s.recording.positions, s.recording.times
+    x = interpolate(t, x, t, "cubic", default_max_gap(t))
+    whole = np.isfinite(x[:, list(tip), 0]).all(axis=1)
+    if not whole.any():
+        return None
+    x, t = x[whole], t[whole]
     swing = along(x[:, list(tip)], dominant_direction(x[:, list(tip)]))
     start = turning(t, swing)
     free = t >= start  # before it the beam is held, and a step hides the frequency
@@ -106,8 +111,7 @@ def _looked_at(s: Seen, base: tuple[int, ...], tip: tuple[int, ...], length: flo
     late = t > max(start, last - max(2.0 / frequency, 0.2 * (last - start)))
     rest = mean_position(x[late])[list(tip)]
     end, clamp = rest.mean(axis=0), np.nanmean(mean_position(x)[list(base)], axis=0)
-    whole = np.isfinite(x[:, list(tip)]).all(axis=(1, 2)) & free
-    turns, _, _ = rigid_motion(np.concatenate([rest[None], x[whole][:, list(tip)]]))
+    turns, _, _ = rigid_motion(np.concatenate([rest[None], x[free][:, list(tip)]]))
     axes = np.stack([turns[:, a, b] - turns[:, b, a] for a, b in ((2, 1), (0, 2), (1, 0))], axis=1)
     up = -s.gravity / np.linalg.norm(s.gravity)
     normal = np.linalg.svd(axes, full_matrices=False)[2][0]
@@ -122,7 +126,7 @@ def _looked_at(s: Seen, base: tuple[int, ...], tip: tuple[int, ...], length: flo
     way = _turned(chord, normal, side * weight / (8.0 * reach))
     end_way = _turned(way, normal, -side * weight / (6.0 * reach))
     frame: Array = np.stack([end_way, normal, np.cross(end_way, normal)])
-    first = x[np.flatnonzero(whole)[0], list(tip)].mean(axis=0) - end
+    first = x[np.flatnonzero(free)[0], list(tip)].mean(axis=0) - end
     calm = float(np.std(swing[late])) < AT_REST * float(np.abs(swing[free] - swing[late].mean()).max())
     resting = float(t[late][0]) if calm else None
     return Beam(start, resting, frequency, clamp, end, reach, normal, way, end_way, (rest - end) @ frame.T, first)

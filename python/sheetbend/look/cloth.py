@@ -48,7 +48,7 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         for guess in (s, turned):  # a cloth does not stand on the edge that holds it
             found = _described([replace(takes[0], seen=guess), *takes[1:]], measured, stands=False)
             if found is not None:
-                return found._replace(up=None if guess is s else guess.up)
+                return found._replace(up=None if guess is s else "xyz"[guess.up])
     return _described(takes, measured, stands=True)
 
 
@@ -68,10 +68,10 @@ def _described(takes: Sequence[Take], measured: Measured, stands: bool) -> Descr
             "configuration by hand",
         )
     sheets, notes, unknown = [], list[str](), list[str]()
-    first = (_looked_at(s, name, own, others, density, {}, None) for name, own in cloths.items())
+    first = (_looked_at(s, name, own, others, density, {}, Measured()) for name, own in cloths.items())
     bars = _bars([sheet for sheet in first if sheet is not None])
     for name, own in cloths.items():
-        sheet = _looked_at(s, name, own, others, density, bars, measured.poses)
+        sheet = _looked_at(s, name, own, others, density, bars, measured)
         if sheet is None:
             unknown.append(lies_over(names, own, "the middle of their cloth is above two of its sides"))
             continue
@@ -156,7 +156,7 @@ def _looked_at(
     others: Sequence[int],
     density: float,
     bars: Mapping[int, tuple[float, ...]],
-    poses: robot.Poses | None,
+    measured: Measured,
 ) -> Sheet | None:
     """A cloth; None where something lies under it. Bars point where its rows beside them do, if not given."""
     r = s.recording
@@ -180,13 +180,17 @@ def _looked_at(
         flat = flat * [found.length / np.ptp(flat[:, 0]), 1.0]
     held = holds(s, own, flat, others, ("left", "right") if is_slung else ("top",), bars)
     ride = None
-    if poses is not None:
-        hold, ride = _on_tool(s, own, flat, held, poses)
+    if measured.poses is not None:
+        hold, ride = _on_tool(s, own, flat, held, measured.poses)
         held = [hold]
     beyond = {hold.side: hold.beyond for hold in held}
     if found is not None:  # the cloth is stretched there too
         beyond |= {side: beyond[side] * found.length / found.first for side in ("left", "right") if side in beyond}
-    free = share(held) * pitches(flat)
+    free, margin = share(held) * pitches(flat), None
+    if measured.margin is not None:  # beyond all outer rows but those beside an edge that is known
+        shown = {h.side for h in held if h.edge is not None or not h.own or (h.moves and not h.corners)}
+        margin, free = tuple(0.0 if side in shown else measured.margin for side in SIDES), 0.0 * free
+        beyond = {side: off for side, off in beyond.items() if side in shown}
     low, high = (
         np.array([beyond.get(side, free[SIDES[side][0]]) for side in sides])
         for sides in (("left", "bottom"), ("right", "top"))
@@ -215,6 +219,7 @@ def _looked_at(
         starts_flat=starts_flat,
         slack=found,
         wind=wind,
+        margin=margin,
         ride=ride,
     )
 
@@ -306,6 +311,7 @@ def _cloth(s: Seen, sheet: Sheet, density: float) -> list[str]:
     lines = ahead + table("[[scene.cloth]]", cloth, {"density": "kg/m^2", "bending": "N m, a guess to start from"})
     cells = [max(2, round(CELLS * side / max(sheet.width, sheet.height))) for side in (sheet.width, sheet.height)]
     mesh = {"kind": "grid", "width": sheet.width, "height": sheet.height, "nx": cells[0], "ny": cells[1]}
+    mesh |= {} if sheet.margin is None else {"margin": list(sheet.margin)}
     lines += table("[scene.cloth.mesh]", mesh)
     for hold in sheet.held:
         if hold.bar is not None and cloth["shape"] is not None:

@@ -30,6 +30,7 @@ class Sheet:
         starts_flat: whether it lies flat in the first frame: a shape through its noisy markers would have wrinkles.
         slack: what it is without tension, where its motion shows it.
         wind: (3,) m/s, a guess, where the cloth hangs askew and hardly moves; None elsewhere.
+        margin: m, on the left, right, lower and upper side, by which it goes on beyond that, as was measured.
         ride: how its upper edge rides on a tool, or its upper row where nothing tells where that edge is.
     """
 
@@ -47,6 +48,7 @@ class Sheet:
     starts_flat: bool
     slack: Slack | None
     wind: Array | None
+    margin: tuple[float, ...] | None = None
     ride: Riding | None = None
 
     @property

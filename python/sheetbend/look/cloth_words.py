@@ -28,7 +28,13 @@ def seen_of(s: Seen, sheet: Sheet, several: bool) -> list[str]:
     whose = f"{sheet.name}: " if several else ""
     beyond = share(sheet.held)
     ends = (
-        f"with {beyond:.2g} of that beyond the outer ones where nothing holds it" if beyond else "up to the outer ones"
+        f"with {1e3 * max(sheet.margin):.3g} mm beyond the outer ones, as given"
+        if sheet.margin is not None
+        else (
+            f"with {beyond:.2g} of that beyond the outer ones where nothing holds it"
+            if beyond
+            else "up to the outer ones"
+        )
     )
     notes = [
         f"{whose}{len(sheet.own)} markers lie on a sheet, some {1e3 * apart:.3g} mm apart: a cloth of "
@@ -115,14 +121,16 @@ def _of_size(sheets: Sequence[Sheet], held: Sequence[Hold]) -> list[str]:
         "1 %, the lowest markers are off by 1 % of the height, and the fitted tension is too stiff. Measure the edges "
         "and the markers on the flat cloth, and which way its warp runs, and correct mesh, origin and markers",
     ]
-    for hold in held:
+    for hold in held if all(sheet.margin is None for sheet in sheets) else ():
         if hold.margin is not None and hold.margin.edge is None:
             said.append(
                 f"how far the held edge is beyond the {_row(hold)} row of markers: {1e3 * hold.margin.length:.0f} mm, "
                 "half of the distance between rows, is taken, because the motion of the rows does not show it. Measure "
-                "it with a ruler, and correct `height`, `origin` and the markers' places: in one example the "
+                "it with a ruler, and give --margin: in one example the "
                 "prediction was off by 7 mm with the true 40 mm, and by 13 mm with 51 mm"
             )
+    if any(sheet.margin is not None for sheet in sheets):
+        return said
     part = "the same share of the distance between them as next to the held edge is taken"
     shares = {share(sheet.held) for sheet in sheets}
     if shares == {HALF}:
@@ -131,7 +139,7 @@ def _of_size(sheets: Sequence[Sheet], held: Sequence[Hold]) -> list[str]:
         part = "nothing is taken, as beyond those in the hands"
     said.append(
         f"how far the cloth goes on beyond its other outer markers: {part}, and its weight and the air on it count. "
-        "Measure it with a ruler, and correct `width`, `height`, `origin` and the markers' places"
+        "Measure it with a ruler, and give --margin, or `margin` of the mesh where sides differ"
     )
     return said
 

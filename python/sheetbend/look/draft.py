@@ -19,6 +19,7 @@ FEWEST = 3  # markers of anything but a pendulum
 OF_ONE_MODEL = (
     ("poses", cloth, "are for a cloth that a robot holds", "leave them out: a rope takes markers on what holds it"),
     ("weight", rope, "hangs at a rope or cable", "leave it out; correct the masses in the configuration"),
+    ("margin", cloth, "is of a cloth beyond its outer markers", "leave it out; --length is that of a rope or beam"),
     ("at", one_point, "is of a beam that one marker shows", "leave it out: it says where the only marker on a beam is"),
 )
 """What is measured for one model alone: the field, the model, what it is for, and what to do with another model."""
@@ -116,8 +117,8 @@ def _item(sentence: str) -> list[str]:
     return [first, *(line.replace("# ", "#   ", 1) for line in rest)]
 
 
-def _told(takes: Sequence[Take], up: int | None) -> list[str]:
-    """About the files themselves; `up` is the axis that the motion shows to point up."""
+def _told(takes: Sequence[Take], up: str | None) -> list[str]:
+    """About the files themselves; `up` is the way that the motion shows to be up."""
     said = []
     for take in takes:
         r = take.seen.recording
@@ -136,9 +137,7 @@ def _told(takes: Sequence[Take], up: int | None) -> list[str]:
     if isinstance(pieces, dict) and pieces:
         each = ", ".join(f"{name} goes on as {joined(more)}" for name, more in pieces.items())
         said.append(f"markers without a label that were lost and found again are joined: {each}")
-    if first.rare:
-        verb = "is" if len(first.rare) == 1 else "are"
-        said.append(f"{joined(first.rare)} {verb} seen in less than a tenth of the frames, and left out")
+    said += first.strangers
     x = first.recording.positions
     box = np.nanmax(x, axis=(0, 1)) - np.nanmin(x, axis=(0, 1))
     said.append(f"the markers fill a box of {' x '.join(f'{v:.3g}' for v in box)} m")
@@ -153,7 +152,7 @@ def _told(takes: Sequence[Take], up: int | None) -> list[str]:
     if takes[0].about_units:
         said.append(takes[0].about_units)
     if first.up_by == "guess" and up is not None:
-        said.append(f"{'xyz'[up]} points up, as the motion shows")
+        said.append(f"{up} points up, as the motion shows")
     elif first.up_by == "guess":
         axis = "xyz"[first.up]
         said.append(

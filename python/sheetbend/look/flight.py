@@ -53,12 +53,16 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     r = s.recording
     if len(takes) > 1 or len(s.bodies) != 1 or len(s.bodies[0]) < len(r.markers):
         return None
-    # a fall shows which axis is up, where the file does not say it
-    ups = [s] if s.up_by != "guess" else [replace(s, up=up) for up in (s.up, 3 - s.up)]
-    found = [(flight, seen) for seen in ups if (flight := _longest(seen)) is not None]
+    # a fall shows which way is up, where the file does not say it
+    ups = {"": s}
+    if s.up_by == "guess":
+        ups = {"xyz"[up]: replace(s, up=up) for up in (s.up, 3 - s.up)}
+        ups |= {f"-{name}": seen.upside_down() for name, seen in ups.items()}
+    found = [(flight, name) for name, seen in ups.items() if (flight := _longest(seen)) is not None]
     if not found:
         return None
-    flight, s = max(found, key=lambda pair: pair[0].frames.stop - pair[0].frames.start)
+    flight, up = max(found, key=lambda pair: pair[0].frames.stop - pair[0].frames.start)
+    s = ups[up]
     t, reach = r.times[flight.frames], _reach(flight.points)
     turned = float(np.linalg.norm(flight.start["spin"])) * float(t[-1] - t[0])
     notes = [
@@ -80,7 +84,7 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
             "the body: see docs/contact.md, Bodies"
         )
     lines = _lines(replace(takes[0], seen=s), flight, reach)
-    return Description("a rigid body in free flight", notes, unknown, lines, s.up)
+    return Description("a rigid body in free flight", notes, unknown, lines, up or None)
 
 
 def _longest(s: Seen) -> Flight | None:

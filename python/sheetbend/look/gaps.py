@@ -68,8 +68,7 @@ def _lost(take: Take, driving: Sequence[str]) -> tuple[list[int], list[tuple[int
     columns = [k for k, name in enumerate(r.markers) if name in driving]
     lost = []
     for k in columns:
-        own = np.flatnonzero(r.mask[:, k]).tolist()
-        lost += [(a, b) for a, b in pairwise(own) if r.times[b] - r.times[a] > GAP]
-        lost += [(-1, own[0])] if own[0] else []
-        lost += [(own[-1], len(r.times))] if own[-1] < len(r.times) - 1 else []
+        own = [-1, *np.flatnonzero(r.mask[:, k]).tolist(), len(r.times)]
+        lost += [(a, b) for a, b in pairwise(own[1:-1]) if r.times[b] - r.times[a] > GAP]
+        lost += [(a, b) for a, b in {(own[0], own[1]), (own[-2], own[-1])} if b - a > 1]
     return columns, lost

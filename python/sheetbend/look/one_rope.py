@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from ..errors import RecordingError
@@ -43,13 +45,15 @@ def _unbranched(s: Seen, order: tuple[int, ...]) -> None:
 
 
 def _one(s: Seen, order: tuple[int, ...]) -> None:
-    """Refuse markers of two ropes: their distance from each other is no distance along a rope, since it changes."""
+    """Refuse markers of two ropes: their distance from each other is no distance along a rope, since it changes, or is
+    longer than both."""
     two = split(s.apart, order)
     if two is None or s.static:
         return
     a, b = two[0][-1], two[1][0]
     x = s.recording.positions
-    if np.nanstd(np.linalg.norm(x[:, a] - x[:, b], axis=1)) > LOOSE * s.apart[a, b]:
+    longer = max(sum(s.apart[j, k] for j, k in pairwise(part)) for part in two)
+    if np.nanstd(np.linalg.norm(x[:, a] - x[:, b], axis=1)) > LOOSE * s.apart[a, b] or s.apart[a, b] > longer:
         first, second = (joined(s.recording.markers[k] for k in part) for part in two)
         fix = "name the markers of one rope with --markers, such as --markers " + repr(
             ",".join(s.recording.markers[k] for k in sorted(two[0]))

@@ -24,6 +24,7 @@ Piece = tuple[dict[str, Any], float]
 SEEN_ASKEW = 0.02  # the same of three arms, which a rope is told from by how it bends
 CHANCE = 6.0  # standard deviations of two estimates of the same noise, times the root of the number of frames
 ASKEW = 2e-3  # of an arm, by which its length changes beyond noise, from which on the view is not square
+STRETCHED = 2e-3  # by how much a picture is wider than it is high, from which on it is told
 FLAT, STRAIGHT = 0.02, 0.01  # of an arm: how far it may leave its plane, and how much its length may change
 BENDS = 0.6  # of l theta^2/24, by which a line gets shorter where it turns, from which on it is a rope: those 1 to 2
 HANGS = 0.5  # of an arm: how far its end is below the pivot on average, at least, where that tells what is up
@@ -66,6 +67,15 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
             f"where the camera is: the arms seem to change their lengths by {100 * apart:.1g} % (1 sd). Its view is "
             "not square to their plane, or its lens is not calibrated. The angles are off by as much, which the "
             "intervals do not count where it is alike in all pieces"
+        )
+    stretch = _stretch(x[:, joints])
+    if stretch is not None:
+        unknown.append(
+            f"what stretches the picture: arms seem {100 * abs(stretch):.2g} % "
+            f"{'longer' if stretch > 0 else 'shorter'} where they lie along x than along z, as before a camera that "
+            "looks at their plane askew, or whose pixels are not square. Angles are off by up to half of that, in rad, "
+            "which the intervals do not count. Calibrate it with something of known size along both axes, or divide x "
+            f"by {1.0 + stretch:.4f}"
         )
     pieces, swing = _pieces(s, takes[0], len(arms)), _swing(x, r.times, joints)
     # The plane is y = 0: elsewhere rounding moves the arms out of it, and the fold of their triangles grows.
@@ -176,6 +186,25 @@ def _drift(s: Seen, a: int, b: int) -> float:
     return _beyond(s, a, b, (1.0 + by_chance) * noise)
 
 
+def _stretch(x: Array) -> float | None:
+    """By how much more than along z arms (frames, joints, 3) are stretched along x, where chance does not explain it:
+    the square of a length L is L^2 + 2 e dx^2 then, in first order, with the same e for all arms. Noise of dx is in
+    both; how large it is, the rest tells."""
+    d = np.diff(x, axis=1)
+    d = d[np.isfinite(d).all(axis=(1, 2))]
+    square, wide = np.square(d).sum(axis=2), np.square(d[..., 0])
+    long, off, across = square.mean(axis=0), square - square.mean(axis=0), 2.0 * (wide - wide.mean(axis=0))
+    size, both = float(np.square(across).sum()), float((across * off).sum())
+    if not size > 0:
+        return None
+    rest = np.square(off - both / size * across)
+    noise = rest.mean(axis=0) / (4.0 * long)  # of dx and dz
+    shared = 4.0 * float((noise * wide).sum())
+    found = (both - shared) / max(size - 4.0 * shared, 0.5 * size)
+    sd = math.sqrt(float(rest.sum()) / max(square.size - d.shape[1] - 1, 1) / size)
+    return found if abs(found) > max(STRETCHED, CHANCE * sd) else None
+
+
 def _beyond(s: Seen, a: int, b: int, variance: float) -> float:
     """How much the distance of two markers changes, relative to it, beyond a variance."""
     changes = float(np.nanvar(_distance(s.recording.positions, a, b)))
@@ -211,6 +240,12 @@ def _upright(take: Take, joints: list[int]) -> bool:
     if wide[normal] >= FLAT * s.apart[joints[0], joints[1]]:
         return False
     up = int(np.argmax(np.abs(down))) if s.up_by == "guess" else int(np.argmax(np.abs(s.gravity)))
+    if normal == 1 and down[2] > HANGS * s.apart[joints[0], joints[1]]:
+        fix = (
+            f"turn it over, in Python: r = sb.Recording.load('{take.file}'); "
+            "sb.Recording(r.positions * [1, -1, -1], r.times, r.markers).save('turned.csv')"
+        )
+        raise RecordingError("markers", "hang upward, if z is up, and arms are described with z up", "-z up", fix)
     if (normal, up) == (1, 2) or abs(down[up]) < HANGS * s.apart[joints[0], joints[1]]:
         return normal == 1
     axes = [3 - normal - up, normal, up]

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
 
 from ..arrays.timeseries import mean_position
+from .end_load import free_end
 from .held import Hands, Held, held, parts
 from .line import snapped, tangent
 from .marked import marked_by
@@ -19,6 +23,7 @@ from .take import Description, Measured, Take
 from .text import joined
 from .unseen import freed
 
+STANDS = 0.5  # of its length: by so much the free end of a rope is above the other one that cannot hang
 LEAST_HELD = 30  # frames before a rope is let go
 
 
@@ -42,6 +47,9 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     found = holding(s, hands, order)
     if len(found.order) < 3:
         return None
+    if s.up_by == "guess" and _stands(s, found):
+        turned = describe([replace(take, seen=take.seen.upside_down()) for take in takes], measured)
+        return None if turned is None else turned._replace(up="-" + "xyz"[s.up])
     pushed = None
     if s.rest and not s.static and not found.grips and len(takes) == 1:
         free = freed(takes[0], found.order, "rope")
@@ -52,6 +60,17 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     kind = "a rope at rest" if s.static else "a rope"
     driving = tuple(name for here in rope.marked for grip in here.held.grips for name in grip["markers"])
     return Description(kind, notes_of(rope), unknown_of(rope), lines_of(rope), driving=driving)
+
+
+def _stands(s: Seen, found: Held) -> bool:
+    """Whether the free end of a rope that something moves is above the other one: a rope hangs."""
+    free = free_end(found)
+    if free is None or not found.grips:
+        return False
+    mean = mean_position(s.recording.positions)[list(found.order)]
+    length = sum(s.apart[a, b] for a, b in pairwise(found.order))
+    rise = (mean[0] - mean[-1]) @ s.gravity / np.linalg.norm(s.gravity)
+    return bool((rise if free == "end" else -rise) > STANDS * length)
 
 
 def _without_others(takes: Sequence[Take], measured: Measured, kept: list[str]) -> Description | None:

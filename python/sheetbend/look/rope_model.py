@@ -119,7 +119,7 @@ def model_of(marked: Sequence[Marked], order: tuple[int, ...], measured: Measure
     length = _length(s, max(marked, key=lambda own: float(own.arcs[-1])), measured)
     density = _density(s, measured)
     normal = plane(s.recording.positions[:, list(order)], length.value)
-    in_space = not s.static and normal is None
+    in_space = not s.static and normal is None and "plane" not in found.rope
     rod = in_space and _can_be_rod(s, found)
     start = Start({"points": "recording"}, []) if s.static else _start(s, found, rod)
     return RopeModel(

@@ -13,6 +13,7 @@ from ..arrays.smoothing import smoothed
 from ..arrays.timeseries import default_max_gap, interpolate, mean_position
 from ..errors import RecordingError
 from ..recording.recording import Recording
+from . import strangers
 from .line import chain
 
 Array = np.ndarray
@@ -24,7 +25,6 @@ MANY, ABOVE = 50, 2.9  # frames from which on 98 % of the distances are 2.05 sqr
 SHARE, FEW = 0.98, 10  # of the frames have smaller distances; frames from which on noise is taken out of these
 SLOWEST = 0.5  # s between two frames of a motion
 REST = 0.15  # s that a recording must begin at rest to be called so
-RARE = 0.1  # of the frames in which the best one is seen: a marker seen in fewer is a reflection, or a stray
 NEAR = 1.9  # times the nearest neighbor's distance: markers of a sheet have more than two others so near
 SHARP, TURNS = 0.15, 3  # share of markers at which the shortest way through those of a sheet turns back, and how many
 SHEET, FEWEST_OF_SHEET = 2.7, 8  # others so near, on average, of a sheet; markers that make one
@@ -47,7 +47,7 @@ class Seen:
         speed: m/s, of the fastest marker, smoothed; 99 % of the frames are slower.
         up: 0, 1 or 2, the axis along which gravity points.
         up_by: who says which way that is: the file, who began the draft, or nobody.
-        rare: names of markers that are hardly ever seen, and left out.
+        strangers: sentences about markers that are left out.
         sheet: whether the loose markers lie on a sheet rather than along a line.
     """
 
@@ -62,7 +62,7 @@ class Seen:
     up: int
     up_by: Literal["file", "user", "guess"]
     sheet: bool
-    rare: tuple[str, ...] = ()
+    strangers: tuple[str, ...] = ()
 
     @property
     def static(self) -> bool:
@@ -75,6 +75,10 @@ class Seen:
         if self.recording.gravity is not None:
             return np.asarray(self.recording.gravity)
         return np.where(np.arange(3) == self.up, -EARTH, 0.0)
+
+    def upside_down(self) -> Seen:
+        """The same, with gravity the other way."""
+        return replace(self, recording=replace(self.recording, gravity=0.0 - self.gravity))
 
     def of(self, part: Recording) -> Seen:
         """What a part of the recording shows alone: some of its markers, or of its time."""
@@ -94,21 +98,25 @@ def seen(recording: Recording, up: str | None = None) -> Seen:
     if up is not None:
         down = np.where(np.array(list("xyz")) == up[-1], EARTH if up[0] == "-" else -EARTH, 0.0)
         recording = replace(recording, gravity=down)
-    often = recording.mask.mean(axis=0)
-    rare = tuple(name for name, share in zip(recording.markers, often, strict=True) if share < RARE * often.max())
-    if rare:
-        recording = recording.select([name for name in recording.markers if name not in rare])
+    if (found := strangers.rare(recording)) is not None:
+        return _without(recording, found, up)
     x, t = recording.positions, recording.times
     count = len(recording.markers)
-    found = recording.noise()
-    noise = float(np.nanmedian(found)) if np.isfinite(found).any() else 0.0
+    each = recording.noise()
+    if (found := strangers.restless(recording, each)) is not None:
+        return _without(recording, found, up)
+    noise = float(np.nanmedian(each)) if np.isfinite(each).any() else 0.0
     center = mean_position(x)
     extent = float(np.linalg.norm(np.nanmax(x, axis=(0, 1)) - np.nanmin(x, axis=(0, 1))))
     moved = np.sqrt(np.nanmean(np.sum((x - center) ** 2, axis=2), axis=0)) if len(t) > 1 else np.zeros(count)
-    still = moved <= max(STILL * noise, SILENT * extent)
     _check_together(recording)
     _check_rate(recording)
     distance = _distances(x)
+    # by each one's own noise: marks of the room make the extent large, and may be noisier
+    stays = moved <= (STILL * np.fmax(each, noise) if noise else SILENT * extent)
+    if (found := strangers.of_the_room(recording, stays, distance)) is not None:
+        return _without(recording, found, up)
+    still = moved <= max(STILL * noise, SILENT * extent)
     apart = np.nanquantile(distance, SHARE, axis=0)
     if len(t) >= FEW:
         apart = np.maximum(apart - _above(len(distance)) * noise, 0.5 * apart)
@@ -129,8 +137,13 @@ def seen(recording: Recording, up: str | None = None) -> Seen:
         up=axis,
         up_by="user" if up is not None else "file" if told else "guess",
         sheet=_is_sheet(x, apart, in_bodies),
-        rare=rare,
     )
+
+
+def _without(recording: Recording, found: strangers.Strangers, up: str | None) -> Seen:
+    """What it shows without some markers."""
+    rest = seen(recording.select([name for k, name in enumerate(recording.markers) if k not in found.markers]), up)
+    return replace(rest, strangers=(found.said, *rest.strangers))
 
 
 def _check_rate(recording: Recording) -> None:

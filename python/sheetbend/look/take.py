@@ -50,6 +50,7 @@ class Measured:
         length: m, of a rope or beam.
         poses: of the robot's tool that holds a cloth.
         weight: kg, of what hangs at the free end of a rope; 0 of an end that is free and carries nothing.
+        margin: m, by which a cloth goes on beyond its outer markers.
         at: m, from the clamp of a beam to the only marker on it.
     """
 
@@ -58,6 +59,7 @@ class Measured:
     poses: Poses | None = None
     weight: float | None = None
     at: float | None = None
+    margin: float | None = None
 
 
 class Description(NamedTuple):
@@ -68,7 +70,7 @@ class Description(NamedTuple):
         notes: sentences about what is seen.
         unknown: sentences about what is not known, and what stands in its place.
         lines: of the configuration, without its head.
-        up: 0, 1 or 2, the axis that points up where the motion shows it.
+        up: which way is up, such as "y" or "-z", where the motion shows it.
         driving: names of the markers that move something.
     """
 
@@ -76,7 +78,7 @@ class Description(NamedTuple):
     notes: list[str]
     unknown: list[str]
     lines: list[str]
-    up: int | None = None
+    up: str | None = None
     driving: tuple[str, ...] = ()
 
 

@@ -57,21 +57,26 @@ def elsewhere(times: Array, track: Array, least: float) -> Mask:
     def reached(a: int, b: int) -> bool:
         return bool(np.linalg.norm(x[a] - x[b]) <= least + fastest * abs(t[a] - t[b]))
 
-    def returned(a: int, b: int) -> bool:
-        """Whether the jump into a stretch and the one out of it cancel: no rope makes either."""
+    def made(a: int, b: int) -> Array:
+        """(3,) m, of the jumps from frame a to frame b together."""
+        return np.asarray(own[[k - 1 for k in bounds[1:-1] if a < k <= b]].sum(axis=0))
+
+    def returned(a: int, b: int, since: int, until: int) -> bool:
+        """Whether the jumps into a stretch, from frame `since` of the path, and those out of it to `until` cancel: no
+        rope makes either."""
         if a == 0 or b == len(seen):
             return False
-        there, back = own[a - 1], own[b - 1]
+        there, back = made(since, a), made(b - 1, until)
         return bool(np.linalg.norm(there + back) < AWAY * max(np.linalg.norm(there), np.linalg.norm(back)))
 
     first, last = stretches[best]
     good = [stretches[best]]
     for a, b in stretches[best + 1 :]:
-        if reached(last - 1, a) and not returned(a, b):
+        if reached(last - 1, a) and not returned(a, b, last - 1, b):
             last = b
             good.append((a, b))
     for a, b in reversed(stretches[:best]):
-        if reached(first, b - 1) and not returned(a, b):
+        if reached(first, b - 1) and not returned(a, b, a - 1, first):
             first = a
             good.append((a, b))
     stray[seen] = True

@@ -1,4 +1,5 @@
-"""Names of columns as people write them: the marker, the axis and the length unit in `tip_x`, `x1`, `M1 X [mm]`."""
+"""Names of columns as people write them: the marker, the axis and the length unit in `tip_x`, `x1`, `M1 X [mm]`, and in
+`distance [mm]`, the only column of a sensor that reads one coordinate."""
 
 from __future__ import annotations
 
@@ -24,6 +25,13 @@ _WAYS = (
 )
 _OF_ROS = re.compile(r"(?:field\.)?(.+?)\.(?:pose\.)?(?:position|point|translation)\.[xyz]", re.DOTALL)
 _BESIDE = re.compile(r"(?:.*\.)?(?:orientation|rotation)\.[xyzw]|(?:field\.)?header\..*", re.DOTALL)
+_ALONE = re.compile(
+    r"(.*?)(?:[\s_]*[\[(]\s*([^\s\[\]()]+)\s*[\])]|(?:_| ?/ ?| in )(?![xyz]$)([a-zµμ]{1,2}))?",
+    re.IGNORECASE | re.DOTALL,
+)
+_LENGTHS = re.compile(
+    r".*(?:distance|displacement|deflection|position|height|laser|abstand|auslenkung|weg)(?:[_. -]?\d+)?", re.IGNORECASE
+)
 _TURNS = {"qx", "qy", "qz", "qw"}
 
 
@@ -55,6 +63,25 @@ def markers(path: Path, line: int, names: Sequence[str]) -> tuple[list[str], str
         match = _OF_ROS.fullmatch(three[0]) if len(three[0]) <= _LONGEST else None
         found.append(match[1] if match else marker)
     return found, told.pop() if told else None
+
+
+def alone(path: Path, line: int, name: str) -> tuple[str, int, str | None]:
+    """The marker, the axis and the length unit of the only column, what a laser or another sensor of one coordinate
+    writes. Axis 2 where the name tells none.
+
+    Raises:
+        RecordingError: the name does not say that it is a length, or has a unit that is not known.
+    """
+    match = _ALONE.fullmatch(name) if len(name) <= _LONGEST else None
+    bare, unit = (match[1].strip(), match[2] or match[3]) if match else (name, None)
+    along = next((found for way in _WAYS if (found := way.fullmatch(bare))), None)
+    if unit is None and along is None and not _LENGTHS.fullmatch(bare):
+        fix = f'if it is a length, write its unit: "{name} [mm]"; write an angle as a place at a known radius'
+        refuse(path, line, "has one column beside the time, and its name does not say that it is a length", name, fix)
+    if unit is not None and unit.lower() not in METERS:
+        refuse(path, line, "must name a length unit", unit, f"write the column in one of {', '.join(METERS)}")
+    axis = 2 if along is None else AXES.index(along["axis"].lower())
+    return bare, axis, None if unit is None else unit.lower()
 
 
 def without_unit(name: str) -> tuple[str, str | None]:

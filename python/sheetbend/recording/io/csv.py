@@ -13,20 +13,24 @@ Long, one row per marker and frame, in any order; a missing row means not seen:
     0.00,tip,0.10,0.0,-0.02
     0.00,base,0.0,0.0,0.0
 
+Or a time and one column, what a laser or another sensor of one coordinate writes: `time,distance [mm]`. It is the z of
+a marker that stays at x = y = 0, or the axis that the name tells.
+
 The header is required and starts with `time` or `t` (s), `time_ms`, `time_us` or `time_ns`; the last three count from
 the first row. A column `frame`, or one without a name, before it is not read; without a time, the frames count at the
 `rate` of the JSON beside the file. `columns` says how markers and axes are written. Cells are separated by commas,
 semicolons or tabs. The decimal mark is a point, or a comma where no cell has a point and commas do not separate cells.
 An empty cell or `nan` is a marker not seen, and so is exactly 0, 0, 0 where a marker is otherwise far from there. Lines
-that start with # are comments; lines without a filled cell are not read. `heading` says what may stand about the
-header. Coordinates are in the length unit of the header, `tip_x [mm]`, or of the JSON beside the file, meters without
-one.
+that start with # are comments; lines without a filled cell, and a row that repeats the one before, are not read.
+`heading` says what may stand about the header. Coordinates are in the length unit of the header, `tip_x [mm]`, or of
+the JSON beside the file, meters without one.
 """
 
 from __future__ import annotations
 
 import csv
 import re
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -144,10 +148,19 @@ def _counted(path: Path, rows: list[Row]) -> Array:
 
 
 def _read_wide(path: Path, header: list[str], header_line: int, rows: list[Row], times: Array) -> MarkerData:
+    again = [False, *(a[1] == b[1] for a, b in pairwise(rows))]  # a row that is there twice tells nothing
+    rows, times = [row for row, twice in zip(rows, again, strict=True) if not twice], times[~np.array(again)]
     own = [k for k, name in enumerate(header) if k and not columns.beside(name)]
-    markers, unit = columns.markers(path, header_line, [header[k] for k in own])
+    names = [header[k] for k in own]
+    if len(names) == 1:
+        marker, axis, unit = columns.alone(path, header_line, names[0])
+        markers = [marker]
+    else:
+        markers, unit = columns.markers(path, header_line, names)
     _check_times(path, rows, times)
     table = np.array([[number(path, line, cells[k]) for k in own] for line, cells in rows])
+    if len(names) == 1:
+        table = np.where(np.arange(3) == axis, table, 0.0 * table)  # nan stays nan
     metadata = {} if unit is None else {"units": unit}
     return MarkerData(without_zeros(table.reshape(len(rows), -1, 3)), times, tuple(markers), metadata=metadata)
 
@@ -180,6 +193,9 @@ def _check_times(path: Path, rows: list[Row], times: Array) -> None:
         if time == previous and len(cells) == 4:
             fix = "name the marker of each row in a column marker; points without names are an sb.Cloud.of(...)"
             refuse(path, line, "must have a time later than the row before", cells[0], fix)
+        if time == previous:
+            fix = "leave out one of the two rows, or correct its time"
+            refuse(path, line, "has the time of the row before, and other places", cells[0], fix)
         if not time > previous:
             refuse(path, line, "must have a time later than the row before", cells[0] or "an empty cell")
         previous = time

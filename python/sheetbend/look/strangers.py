@@ -1,0 +1,85 @@
+"""Markers in a recording that belong to nothing that moves in it: reflections, and marks of the room.
+
+What holds an object is near it, or keeps its distance from the nearest marker on it. A mark of the room does neither.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..recording.recording import Recording
+from .text import joined
+
+Array = np.ndarray
+RARE = 0.2  # of the frames in which the best one is seen: a marker seen in fewer is a reflection, or a stray
+RESTLESS, WILD = 10.0, 0.1  # noise of a reflection: times that of the others, and of the size of what they show
+FAR = 3.0  # times the distance between neighbors: markers of one object, and of what holds it, are nearer
+OUTSIDE = 0.5  # of the size of what moves: how far a mark of the room is from it
+KEEPS = 0.2  # of the distance between neighbors, and of their motion: by so much that of a holder changes at most (sd)
+FEWEST = 3  # markers of an object
+
+
+class Strangers(NamedTuple):
+    """Numbers of markers that are left out, and a sentence about them."""
+
+    markers: tuple[int, ...]
+    said: str
+
+
+def rare(recording: Recording) -> Strangers | None:
+    """Markers that are hardly ever seen."""
+    often = recording.mask.mean(axis=0)
+    found = np.flatnonzero(often < RARE * often.max())
+    return _told(recording, found, "seen in less than a fifth of the frames, and left out")
+
+
+def restless(recording: Recording, noise: Array) -> Strangers | None:
+    """Markers that are somewhere else in every frame.
+
+    Args:
+        noise: (markers,) m, that of each.
+    """
+    x, count = recording.positions, len(noise)
+    if count <= FEWEST:
+        return None
+    found = []
+    for k in np.flatnonzero(noise > RESTLESS * np.nanmedian(noise)):
+        others = np.delete(x, k, axis=1)
+        size = np.linalg.norm(np.subtract(*np.nanquantile(others, [0.99, 0.01], axis=(0, 1))))
+        found += [int(k)] if noise[k] > WILD * size else []
+    return _told(recording, found, "somewhere else in every frame, as reflections are, and left out")
+
+
+def of_the_room(recording: Recording, still: Array, distance: Array) -> Strangers | None:
+    """Markers that stay in place, far from what moves, and that hold nothing.
+
+    Args:
+        still: (markers,) whether each stays in place.
+        distance: (frames, markers, markers) m.
+    """
+    moving = np.flatnonzero(~still)
+    if len(moving) < FEWEST or len(moving) == len(still):
+        return None
+    mean, varies = np.nanmean(distance, axis=0), np.nanstd(distance, axis=0)
+    moved = np.sqrt(np.nanvar(recording.positions, axis=0).sum(axis=1))
+    among = mean[np.ix_(moving, moving)] + np.where(np.eye(len(moving), dtype=bool), np.inf, 0.0)
+    spacing = float(np.median(among.min(axis=1)))
+    resting = np.flatnonzero(still)
+    nearest = moving[np.argmin(mean[np.ix_(resting, moving)], axis=1)]
+    away = mean[resting, nearest]
+    holds = (away <= FAR * spacing) | (varies[resting, nearest] <= KEEPS * np.minimum(moved[nearest], spacing))
+    holds &= away <= FAR * max(float(away[holds].min(initial=np.inf)), spacing)
+    object_ = np.concatenate([moving, resting[holds]])
+    size = float(mean[np.ix_(object_, object_)].max())
+    return _told(
+        recording, resting[~holds & (away > OUTSIDE * size)], "in one place, far from what moves, and left out"
+    )
+
+
+def _told(recording: Recording, found: Array | list[int], how: str) -> Strangers | None:
+    if not len(found):
+        return None
+    names = [recording.markers[k] for k in found]
+    return Strangers(tuple(int(k) for k in found), f"{joined(names)} {'is' if len(names) == 1 else 'are'} {how}")
