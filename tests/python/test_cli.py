@@ -367,6 +367,7 @@ class TestInfo:
         recording.save(config.parent / "take.csv")
         shown = run("info", config.parent / "take.csv")
         assert shown.exit_code == 0 and "4 frames, 2 markers" in shown.output and "grip[0]" in shown.output
+        assert "constraints" not in shown.output  # what is installed is shown without a file alone
         assert "25.0%" in shown.output
         found = last_line(run("info", config.parent / "take.csv", "--json"))["recording"]
         assert found["markers"] == {"grip[0]": [0.1, 0.2, 0.3], "tip": [0.4, 0.5, 0.6]}

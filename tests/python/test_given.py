@@ -236,9 +236,11 @@ def test_an_estimate_rests_on_what_may_move_it_unseen() -> None:
         return replace(result, estimates=with_dependences(result))
 
     text = told(whole).report()
-    assert "right to: table about x 0.092 degrees. A larger error" in text
+    assert "must be right to: table about x 0.092 degrees. A larger error" in text
     assert "[0.3528, 0.3672]        identified       0.021\n" in text
-    assert "unseen in the residuals. What counts most: table about x (friction)" in " ".join(text.split())
+    assert "unless residuals would show it. Most of it comes from table about x (for friction)" in " ".join(
+        text.split()
+    )
     assert [e.in_all for e in told(whole).estimates] == pytest.approx(
         [math.hypot(0.0072, 0.078 / 4), math.hypot(0.0025, 6e-3 / 4)], rel=1e-5
     )

@@ -347,3 +347,21 @@ def test_one_column_that_is_no_length_is_refused(tmp_path: Path, name: str, word
     (tmp_path / "take.csv").write_text(f"time,{name}\n0,1\n0.01,2\n")
     with pytest.raises(RecordingError, match=words):
         Recording.load(tmp_path / "take.csv")
+
+
+def test_quoted_decimal_commas_between_commas(tmp_path: Path) -> None:
+    """Google's tables in a language with decimal commas export such files."""
+    file = tmp_path / "take.csv"
+    file.write_text('time,a_x,a_y,a_z\n0,"0,5","0,25",3\n"0,01","0,5","-0,25",3\n')
+    got = Recording.load(file)
+    assert got.positions[:, 0].tolist() == [[0.5, 0.25, 3.0], [0.5, -0.25, 3.0]] and got.times.tolist() == [0.0, 0.01]
+    file.write_text('time,a_x,a_y,a_z\n0,"1,040",250,3\n')  # a thousand, or one and a bit?
+    with pytest.raises(RecordingError, match="holds a cell that is no number"):
+        Recording.load(file)
+
+
+def test_decimal_commas_that_split_cells_are_named(tmp_path: Path) -> None:
+    file = tmp_path / "take.csv"
+    file.write_text("time,a_x,a_y,a_z\n0,00,0,50,0,25,3,00\n")
+    with pytest.raises(RecordingError, match=r"must have 4 cells, like the header \(got 8\).*semicolons"):
+        Recording.load(file)

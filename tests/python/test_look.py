@@ -587,3 +587,11 @@ def test_the_tutorial_runs_as_it_stands(tmp_path: Path, monkeypatch: pytest.Monk
         assert found[name].half_width == approx(half, rel=0.1), name
         assert abs(found[name].value - true) < half, name
     assert found.recordings[0].held_out == approx(1.05e-3, rel=0.05)
+
+
+def test_a_density_in_grams_is_named_at_once(tmp_path: Path) -> None:
+    """The fit warned of it, after minutes."""
+    recording = sb.Recording.load(Path(__file__).parents[2] / "experiments/twin/data/twin.npz")
+    recording.save(tmp_path / "take.csv")
+    found = run("new", tmp_path / "take.csv", "--density", "50", "--output", tmp_path / "take.toml")
+    assert found.exit_code == 0 and "Is it in g/m? Then write `density` = 0.05" in found.stdout, found.output

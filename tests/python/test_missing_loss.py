@@ -286,7 +286,7 @@ def test_its_simulation_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sheetbend.fitting.conclusion.missing_loss", lambda *given: {})
     without = fitted(e, "rope_EI").result
     assert with_it.judging == (without.judging[0] + 2, without.judging[1] + 1)  # of the given drag, and of all losses
-    assert f"besides, for intervals and doubts: {with_it.judging[0]}, " in with_it.report()
+    assert f"more simulations, for intervals and checks: {with_it.judging[0]}, " in with_it.report()
 
 
 def test_noise_is_hardly_ever_taken_for_a_loss() -> None:

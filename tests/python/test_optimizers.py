@@ -334,7 +334,7 @@ def test_a_refit_is_part_of_the_saved_result(tmp_path):
     for e in found.estimates:
         step = made.to_limit * np.log1p(made.moved[e.name] / e.value)
         assert e.discretization == approx(e.value * np.expm1(abs(step))) and e.discretization > 0
-    assert "What refits on a finer discretization move" in found.report()
+    assert "How much a finer discretization changes the values" in found.report()
     earlier = {key: value for key, value in found.to_dict().items() if key not in ("refits", "not_counted")}
     assert sb.FitResult.from_dict(earlier).refits == ()
 

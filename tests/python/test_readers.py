@@ -249,15 +249,23 @@ def test_damaged_npz_is_refused_or_reads_the_same(tmp_path: Path, data: st.DataO
 @pytest.mark.parametrize("suffix", [".npz", ".csv"])
 def test_missing_and_empty_files_are_refused(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"nothing{suffix}"
-    with pytest.raises(RecordingError, match=r"path: is no file .*nothing"):
+    with pytest.raises(RecordingError, match=rf"nothing{suffix}: is no file"):
         Recording.load(path)
     path.touch()
     with pytest.raises(RecordingError, match=r"is empty .*0 bytes"):
         Recording.load(path)
     folder = tmp_path / f"folder{suffix}"
     folder.mkdir()
-    with pytest.raises(RecordingError, match="path: is no file"):
+    with pytest.raises(RecordingError, match=rf"folder{suffix}: is a folder"):
         Recording.load(folder)
+
+
+def test_a_name_that_is_spelled_wrong_is_mended(tmp_path: Path) -> None:
+    (tmp_path / "take_1.csv").write_text("time,a_x,a_y,a_z\n0,1,2,3\n")
+    with pytest.raises(RecordingError, match=r"tkae_1.csv: is no file .*Fix: did you mean .*take_1.csv\?"):
+        Recording.load(tmp_path / "tkae_1.csv")
+    with pytest.raises(RecordingError, match="Fix: give a path; relative paths start at "):
+        Recording.load(tmp_path / "nowhere" / "take_1.csv")
 
 
 def test_unknown_suffix_and_folder_are_refused(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from .. import _core
-from ..config import GrippedConfig, build, parse_any, scene_alone
+from ..config import GrippedConfig, Study, build, parse_any, scene_alone
 from ..doubts.implausible import other_than_meant
 from ..errors import ConfigError
 from ..experiment.experiment import Experiment
@@ -46,10 +46,10 @@ def info(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Show what a recording or a configuration contains, and which versions are installed.
+    """Show what a recording or a configuration contains, or which versions are installed.
 
-    Prints the versions and what this build contains. With a recording, also what it holds and where each marker is
-    first seen. With a configuration, also its scenes, quantities and parameters.
+    Of a recording: what it holds, its noise, and where each marker is first seen. Of a configuration: its scenes,
+    quantities and parameters. Without a file: the versions, and what this build contains.
 
     Example: sheetbend info experiments/twin/data/twin.npz
     """
@@ -65,6 +65,16 @@ def _info(console: Console, path: Path | None) -> Outcome:
     data: dict[str, Any] = {"sheetbend": __version__, "python": platform.python_version(), "packages": _packages()}
     data["kernels"] = {"used": _core.instruction_set(), "compiled": _core.compiled_instruction_sets()}
     data |= {"ceres": has_ceres(), "constraints": {name: kind["arity"] for name, kind in KINDS.items()}}
+    if path is None:
+        _show_installation(console, data)
+    elif path.suffix.lower() in FORMATS or path.is_dir():
+        data["recording"] = _recording(console, Recording.load(path))
+    else:
+        data["config"] = _config(console, path)
+    return Outcome(data)
+
+
+def _show_installation(console: Console, data: dict[str, Any]) -> None:
     heading(console, f"sheetbend {__version__}", f"Python {data['python']}, {platform.machine()}")
     console.print(
         "  optimizers   ",
@@ -79,11 +89,13 @@ def _info(console: Console, path: Path | None) -> Outcome:
         ", ".join(f"{name} {version or 'missing'}" for name, version in data["packages"].items()),
         soft_wrap=True,
     )
-    if path is not None and (path.suffix.lower() in FORMATS or path.is_dir()):
-        data["recording"] = _recording(console, Recording.load(path))
-    elif path is not None:
-        data["config"] = _config(console, path)
-    return Outcome(data)
+
+
+def warn_of_units(console: Console, study: Study) -> None:
+    """Print a warning for every number that is likely to be in another unit."""
+    if study.experiments:
+        fitted = as_parameters(study.parameters, study.experiments) if study.parameters else None
+        listing(console, (f"warning: {words}" for words in other_than_meant(study.experiments, fitted)))
 
 
 def _packages() -> dict[str, str | None]:
@@ -101,7 +113,7 @@ def _recording(console: Console, recording: Recording) -> dict[str, Any]:
     """Print a recording's size, noise and boundary, and every marker with the place where it is first seen."""
     first = recording.mask.argmax(axis=0)
     at = recording.positions[first, np.arange(len(first))]
-    console.print("\n" + recording.summary(), soft_wrap=True)
+    console.print(recording.summary(), soft_wrap=True)
     doubt = unit_doubt(recording)
     if doubt is not None:
         said = (
@@ -135,14 +147,12 @@ def _config(console: Console, path: Path) -> dict[str, Any]:
     with reading(path, ConfigError):
         study = build(config, path.parent)
         first = study.experiments[0].scene if study.experiments else scene_alone(config, path.parent)[0]
-    heading(console, config.experiment.name, config.experiment.about, above="\n")
+    heading(console, config.experiment.name, config.experiment.about)
     scenes = [_recorded(e) for e in study.experiments] or [_counts(first)]
     for scene in scenes:
         console.print("  " + ", ".join(f"{name} {_text(value)}" for name, value in scene.items()), soft_wrap=True)
     listing(console, study.assumptions)
-    if study.experiments:
-        fitted = as_parameters(study.parameters, study.experiments) if study.parameters else None
-        listing(console, (f"warning: {words}" for words in other_than_meant(study.experiments, fitted)))
+    warn_of_units(console, study)
     grown = [over_fit(e) for e in study.experiments if not e.static and e.predict is None]
     for g in grown:
         console.print(f"  {in_words(g)}", markup=False, soft_wrap=True)
@@ -162,7 +172,7 @@ def _config(console: Console, path: Path) -> dict[str, Any]:
 
 def _ropes(console: Console, config: GrippedConfig, ropes: list[RopeData]) -> dict[str, Any]:
     """Ropes between grips: what was recorded, and what is to be fitted."""
-    heading(console, config.experiment.name, config.experiment.about, above="\n")
+    heading(console, config.experiment.name, config.experiment.about)
     told: dict[str, dict[str, Any]] = {}
     doubtful = {r.section.name: doubts(r.train, r.section.gravity or gravities(r.train)[-1]) for r in ropes}
     for rope in ropes:

@@ -27,6 +27,7 @@ from ..recording.relabeled import shuffled
 from ..recording.unit_doubt import LONGEST, unit_doubt, unit_words
 from .folders import made
 from .gripped import load_ropes
+from .info import warn_of_units
 from .outcome import Json, Outcome, run
 from .screen import heading, listing
 from .spelling import options
@@ -34,7 +35,7 @@ from .targets import check_targets
 
 CLOUD = (
     "write a configuration by hand: what holds the cloth or the rope from a recording of markers or a robot's poses in "
-    "`file` and [[scene.tool]], and the points as `cloud` in [[recording]] (docs/recordings.md, Point clouds)"
+    "`file` and [[scene.tool]], and the points as `cloud` in [[recording]] (docs/clouds.md)"
 )
 ELSEWHERE = {
     "counts": ("a point cloud", CLOUD),
@@ -255,6 +256,7 @@ def _built(console: Console, target: Path) -> dict[str, Any]:
     if study.assumptions:
         console.print("how it is held:")
         listing(console, study.assumptions)
+    warn_of_units(console, study)
     return {"parameters": list(study.parameters)}
 
 

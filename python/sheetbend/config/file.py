@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..errors import ConfigError
-from ..files.door import bounded_bytes, reading
+from ..files.door import bounded_bytes, check_file, reading
 from ..files.json_file import check_depth
 from ..files.names import steering
 from ..recording.io import FORMATS
@@ -73,8 +73,7 @@ def content(path: Path) -> dict[str, Any]:
     Raises:
         ConfigError: it is missing, no TOML, or larger than `LARGEST`, or a text in it would steer a terminal.
     """
-    if not path.is_file():
-        raise ConfigError(str(path), "is no file", str(path), "give the path of a configuration, such as my.toml")
+    check_file(path, ConfigError, "the path of a configuration, such as my.toml")
     if path.suffix.lower() in FORMATS:
         fix = f"write a configuration for it first, with `sheetbend new {path.name}`"
         raise ConfigError(str(path), "is a recording, not a configuration", path.name, fix)

@@ -125,7 +125,7 @@ def predicted_values(
                 own = e.scene.quantities[p.name].value if p.initial is None else p.initial
                 complete[f"{p.name}[{e.name}]"] = float(np.mean(others)) if others else own
         elif private:
-            words = "fitted to the recording's own first window"
+            words = "fitted to the beginning of its own recording"
             shared = [
                 replace(p, fixed=True, prior=None, initial=values[p.name])
                 for p in wanted.values()

@@ -3,6 +3,7 @@ file may ask for is bounded, and commands learn what was read, so that they neve
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -39,6 +40,25 @@ def note(path: str | Path) -> None:
     found = _read.get()
     if found is not None:
         found.add(Path(path))
+
+
+def check_file(path: Path, error: type[InputError] = RecordingError, wanted: str = "a path") -> None:
+    """Refuse a path at which there is no file; the fix names one beside it that is spelled alike.
+
+    Args:
+        path: of a file that is to be read.
+        error: the class of what is raised.
+        wanted: what to give instead, where no file is spelled alike.
+
+    Raises:
+        InputError: of the class `error`.
+    """
+    if path.is_file():
+        return
+    beside = [file.name for file in path.parent.iterdir()] if path.parent.is_dir() else []
+    near = [] if path.is_dir() else difflib.get_close_matches(path.name, beside, n=1)
+    fix = f"did you mean {path.with_name(near[0])}?" if near else f"give {wanted}; relative paths start at {Path.cwd()}"
+    raise error(str(path), "is a folder" if path.is_dir() else "is no file", str(path), fix)
 
 
 @contextmanager

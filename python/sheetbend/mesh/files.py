@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.checks import finite
 from ..errors import MeshError
-from ..files.door import note, reading
+from ..files.door import check_file, note, reading
 from ..files.units import METERS
 from ..optional import require
 from .alike import turned_alike
@@ -137,8 +137,7 @@ def _read(path: Path) -> tuple[Array, NDArray[np.int64], Array | None]:
     """Vertices (n, 3), triangles (m, 3), and texture coordinates (m, 3, 2) where the file has them."""
     if path.suffix.lower() not in _FORMATS:
         raise MeshError("path", "has a suffix that no reader knows", str(path), f"use one of {', '.join(_FORMATS)}")
-    if not path.is_file():
-        raise MeshError("path", "is no file", str(path), "check the path; it starts at the working directory")
+    check_file(path, MeshError)
     ordered, split = _FORMATS[path.suffix.lower()]
     whole = _load(path, ordered)
     vertices, triangles = np.array(whole.vertices, dtype=float), np.array(whole.faces, dtype=np.int64)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arrays.checks import finite
 from ..errors import MeshError
-from ..files.door import note, reading
+from ..files.door import check_file, note, reading
 from ..files.units import METERS
 from ..optional import require
 from .gmsh_counts import check_counts
@@ -49,8 +49,7 @@ def read_solid(path: str | Path, unit: str = "m") -> SolidMesh:
 def _mesh(path: Path, meters: float) -> SolidMesh:
     if path.suffix.lower() not in FORMATS:
         raise MeshError("path", "has a suffix that no reader knows", str(path), f"use one of {', '.join(FORMATS)}")
-    if not path.is_file():
-        raise MeshError("path", "is no file", str(path), "check the path; it starts at the working directory")
+    check_file(path, MeshError)
     if path.suffix.lower() == ".msh":
         check_counts(path)
     content = _load(path)

@@ -26,7 +26,7 @@ from .render import compressed, render, table
 from .shown import Shown, fitted_motion
 
 MOST_MATRIX = 60  # parameters whose correlations are drawn; the table has the strongest of more
-_FIRST = ("Misfit", "Parameters", "What contradicts this fit", "Warnings")
+_FIRST = ("Summary", "Misfit", "Parameters", "What contradicts this fit", "Warnings")
 
 
 def fit_page(

@@ -27,7 +27,7 @@ class Cloud(Recording):
     """Unordered points on a cloth or a rope, another number of them in every frame; some or many may be missing.
 
     A fit compares each point with the closest place on the simulated cloth or rope: see "Point clouds" in
-    docs/recordings.md.
+    docs/clouds.md.
     Make one with `Cloud.of` or `Cloud.load`. It is a `Recording` whose points have no names: row k of one frame is
     another point than row k of the next, so whatever follows a marker over time (`select`, `resample`, `filled`,
     `noise`) is refused.

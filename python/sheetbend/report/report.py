@@ -23,6 +23,7 @@ from .report_profiles import lopsided_profiles
 from .report_recordings import forces, held_out_motion, recordings
 from .report_shot import shot_motions
 from .report_starts import groups_of_starts, starts_note
+from .summary import summary
 from .tables import WIDTH, Section, plain_section, rich_section, wide
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ def sections(result: FitData) -> list[Section]:
     """The report as data, empty sections left out."""
     whole, result = result, without_modes(result)
     parts = [
+        summary(result),
         _misfit(result),
         _parameters(result),
         _unsound(result),
@@ -121,7 +123,10 @@ def _misfit(result: FitData) -> Section:
     sigma = f"{told[0]} mm" if told[0] == told[1] else f"{told[0]} to {told[1]} mm"
     beyond = f"{short(1e3 * m.model_error)} mm in each coordinate" if m.model_error > 0 else "residuals are below sigma"
     notes: tuple[tuple[str, str], ...] = (
-        ("reduced chi-square", f"{short(m.reduced_chi_square)}, against the given sigma of {sigma}"),
+        (
+            "reduced chi-square",
+            f"{short(m.reduced_chi_square)}; 1 if the residuals are as large as the given sigma of {sigma}",
+        ),
         ("model error beyond sigma", beyond),
     )
     if 0 < m.reduced_chi_square < FAR_BELOW**2:
@@ -149,10 +154,10 @@ def _parameters(result: FitData) -> Section:
     in_all = {e.name: _in_all(e) for e in result.estimates if e.in_all and e.in_all > FELT * (e.half_width or math.inf)}
     if in_all:
         beside = [(*row, in_all.get(row[0], "")) for row in rows]
-        words = f"if given values, which intervals take as exact, are off by up to {PLAUSIBLE}, unseen in the residuals"
+        words = f"half-width if given values may be off too, by up to {PLAUSIBLE}, unless residuals would show it"
         if wide(((*headers, IN_ALL), *beside)):
             shared = [name for name in in_all if not name.endswith("]")] or list(in_all)
-            words = f"{', '.join(f'{name} {in_all[name]}' for name in shared)}, {words}"
+            words = f"{', '.join(f'{name} {in_all[name]}' for name in shared)}: {words}"
         else:
             headers, rows = (*headers, IN_ALL), beside
         notes.insert(0, (IN_ALL, f"{words}{_most(dependences(result))}"))
@@ -164,8 +169,8 @@ def _most(found: Mapping[str, Dependence]) -> str:
     of: dict[str, list[str]] = {}
     for name, on in found.items():
         of.setdefault(on.name, []).append(name)
-    most = ", ".join(f"{given} ({', '.join(names)})" for given, names in of.items())
-    return f". What counts most: {most}" if most else ""
+    most = ", ".join(f"{given} (for {', '.join(names)})" for given, names in of.items())
+    return f". Most of it comes from {most}" if most else ""
 
 
 def _in_all(estimate: Estimate) -> str:
@@ -207,11 +212,12 @@ def _interval_parts(result: FitData) -> Section:
     more = (["systematic"] if counted else []) + (["value moved by"] if moved else [])
     driven = ["driven noise"] if shaken else []
     headers = ("parameter", "+/-", "statistical", *driven, "discretization", *more, "unit")
-    meshes = " and of fine meshes" if any(refit.left for refit in result.refits) else ""
-    note = f"values are moved to the limit of short substeps{meshes}, and what that leaves open is counted"
+    meshes = " and fine meshes" if any(refit.left for refit in result.refits) else ""
+    note = f'values are extrapolated to short substeps{meshes} ("value moved by"); this is the error that remains'
     notes = [("discretization", note)] if moved and rows else []
     if shaken and rows:
-        notes.insert(0, ("driven noise", "of what drives the scenes; adds to the statistical part as squares do"))
+        words = "from the noise of what drives a scene; its square adds to that of the statistical part"
+        notes.insert(0, ("driven noise", words))
     return Section("Where the intervals come from", headers, tuple(rows), tuple(notes))
 
 
@@ -222,7 +228,7 @@ def _refits(result: FitData) -> Section:
         if e.half_width is not None:
             rows.append((e.name, *figures(moved, e.half_width / 10), e.unit))
     headers = ("parameter", *(refit.name for refit in result.refits), "unit")
-    return Section("What refits on a finer discretization move", headers, tuple(rows))
+    return Section("How much a finer discretization changes the values", headers, tuple(rows))
 
 
 def _unknown(result: FitData) -> Section:
@@ -238,7 +244,9 @@ def _unknown(result: FitData) -> Section:
     if any(e.verdict == "at its floor" for e in result.estimates):
         others = [e.name for e in result.estimates if e.verdict in ("identified", "weak")]
         if others:
-            notes.append((", ".join(others), "doubtful too: a solver that makes up one number shifts those beside it"))
+            notes.append(
+                (", ".join(others), "doubtful too, because the solver's own stiffness or damping shifts them as well")
+            )
     return Section("What the data cannot tell", notes=tuple(notes))
 
 
@@ -256,20 +264,20 @@ def _grown(growth: MotionGrowth) -> str:
     """How small displacements grow along one motion, at the end of the fit."""
     largest = growth.largest[1]
     size = "without limit" if largest is None else f"{largest:.2g} times"
-    until = "" if growth.until[1] is None else f"; beyond {growth.until[1]:.3g} s nothing can be derived from it"
-    return f"small displacements grow {size}{until}"
+    until = "" if growth.until[1] is None else f"; beyond {growth.until[1]:.3g} s derivatives are of no use"
+    return f"small disturbances grow {size}{until}"
 
 
 def _course(result: FitData) -> Section:
     notes = [("cost", f"{result.cost:.6g} over {result.rows:,} residuals, {len(result.estimates)} free parameters")]
     if result.first_cost is not None:
-        fell = f", {result.first_cost / result.cost:,.3g} times the end's" if result.cost > 0 else ""
-        notes.append(("at the start", f"{result.first_cost:.6g}{fell}"))
+        fell = f", {result.first_cost / result.cost:,.3g} times that at the end" if result.cost > 0 else ""
+        notes.append(("cost at the start", f"{result.first_cost:.6g}{fell}"))
     if result.evaluations:
         notes.append(("simulations", f"{result.evaluations:,}, {result.jacobians:,} of them with a Jacobian"))
     if result.judging[0] > 0:
         more = f"{result.judging[0]:,}, {result.judging[1]:,} of them with a Jacobian"
-        notes.append(("besides, for intervals and doubts", more))
+        notes.append(("more simulations, for intervals and checks", more))
     if result.windows:
         notes.append(("windows fitted first", ", ".join(f"{length:.3g}" for length in result.windows) + " s"))
     notes += [(f"growth in {g.name}", _grown(g)) for g in result.growth if (g.largest[1] or math.inf) > GROWTH_SHOWN]
@@ -277,9 +285,9 @@ def _course(result: FitData) -> Section:
         notes.append(("a Jacobian took", f"{result.jacobian_seconds:.3g} s"))
     if result.autocorrelation_time > 1.05:
         time = result.autocorrelation_time
-        words = f"one in {time:.3g} counts as independent; the intervals allow for it"
-        notes.append(("neighboring residuals are alike", words))
+        words = f"{time:.3g} of them count as one independent residual in the intervals"
+        notes.append(("neighboring residuals are correlated", words))
     if result.condition:
-        notes.append(("where it starts", result.condition))
+        notes.append(("Jacobian at the start", result.condition))
     notes += starts_note(result)
-    return Section("Course", notes=tuple(notes))
+    return Section("Search", notes=tuple(notes))

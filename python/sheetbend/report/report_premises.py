@@ -46,7 +46,13 @@ def premises(result: FitData) -> Section:
     notes = _rests_on(every, closed, strength) if rows else ()
     if right_to:
         sizes = ", ".join(f"{p.name} {right_to[p.name]}" for p in every if p.name in right_to)
-        notes = (("right to", f"{sizes}. A larger error may move a parameter out of its interval unseen"), *notes)
+        notes = (
+            (
+                "must be right to",
+                f"{sizes}. A larger error may move a parameter out of its interval without a trace in the residuals",
+            ),
+            *notes,
+        )
     return Section("What the result rests on", headers, tuple(rows), notes)
 
 
@@ -80,5 +86,6 @@ def _rests_on(
         if times > 1:
             far = f"an error of {exact[0].words} in {exact[0].name} would move {strongest.name}"
             words += f", but {far} by {short(times, 2)} half-widths"
-        notes.append(("", f"{words}. Standard deviations (given = ...) make them count"))
+        how = "give standard deviations ([given] in a configuration, given= in Python)"
+        notes.append(("", f"{words}. To include such errors in the intervals, {how}"))
     return tuple(notes)

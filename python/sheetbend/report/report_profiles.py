@@ -22,8 +22,10 @@ def lopsided_profiles(result: FitData) -> Section:
             rows.append((curve.name, *("open" if part is None else short(part, 3) for part in (lower, upper))))
     if not rows:
         return Section("Profiles")
-    words = f"distances of the ends from the estimate, in half-widths of the linear picture; {len(rows)} of "
-    words += f"{len(result.profiles)} profiles are listed, whose ends differ from 1 by more than {short(_SHOWN, 2)}"
+    words = (
+        "how far the ends of the interval are from the estimate, in half-widths of the interval of a linear model. "
+        f"Listed are {len(rows)} of {len(result.profiles)} parameters, where an end is off by more than {_SHOWN:.0%}"
+    ).replace("%", " %")
     return Section("Profiles", ("parameter", "lower end", "upper end"), tuple(rows), (("ends", words),))
 
 

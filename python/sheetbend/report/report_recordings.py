@@ -12,7 +12,7 @@ def recordings(result: FitData) -> Section:
     rows = [_recording_row(recording) for recording in result.recordings]
     headers: tuple[str, ...] = (
         "recording",
-        "rows",
+        "residuals",
         "fitted rms",
         "held-out rms",
         "baseline rms",
@@ -40,7 +40,7 @@ def forces(result: FitData) -> Section:
         for f in result.forces
     ]
     units = [(f.unit,) for f in result.forces]
-    headers: tuple[str, ...] = ("recording", "sensor", "rows", "fitted rms", "held-out rms", "constant", "unit")
+    headers: tuple[str, ...] = ("recording", "sensor", "residuals", "fitted rms", "held-out rms", "constant", "unit")
     every = [(*row, *unit) for row, unit in zip(rows, units, strict=True)]
     if all(f.held_out is None for f in result.forces):
         headers, every = headers[:4] + headers[5:], [row[:4] + row[5:] for row in every]
@@ -68,7 +68,7 @@ def _started(recording: RecordingFit) -> str:
 
 
 def _recording_row(recording: RecordingFit) -> tuple[str, ...]:
-    factor, unit = _readable(recording)
+    factor, unit = readable(recording)
 
     def number(value: float | None) -> str:
         return "" if value is None else short(value * factor)
@@ -92,7 +92,7 @@ def held_out_motion(result: FitData) -> Section:
 
 
 def _motion_row(recording: RecordingFit) -> tuple[str, ...]:
-    factor, unit = _readable(recording)
+    factor, unit = readable(recording)
     motion, error = recording.motion or 0.0, recording.held_out
     share = "" if error is None else f"{100 * error / motion:.3g} %"
     measured, simulated = recording.measured_frequency, recording.simulated_frequency
@@ -101,6 +101,7 @@ def _motion_row(recording: RecordingFit) -> tuple[str, ...]:
     return (recording.name, short(motion * factor), unit, share, *rhythm, difference)
 
 
-def _readable(recording: RecordingFit) -> tuple[float, str]:
+def readable(recording: RecordingFit) -> tuple[float, str]:
+    """Factor and unit in which the errors of a recording are written."""
     sizes = (recording.rms or 0.0, recording.held_out or 0.0, recording.baseline or 0.0)
     return (1e3, "mm") if recording.unit == "m" and max(sizes) < 1 else (1.0, recording.unit)

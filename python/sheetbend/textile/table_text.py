@@ -18,7 +18,7 @@ from typing import NoReturn
 import numpy as np
 
 from ..errors import InputError, RecordingError
-from ..files.door import bounded_bytes
+from ..files.door import bounded_bytes, check_file
 from .units import unit
 
 LARGEST = 2**25
@@ -111,8 +111,7 @@ _ZIP, _OLE = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
 
 
 def _text(path: Path) -> str:
-    if not path.is_file():
-        raise RecordingError("path", "is no file", str(path), "check the path")
+    check_file(path)
     data = bounded_bytes(path, LARGEST)
     if data[: len(_ZIP)] == _ZIP or data[: len(_OLE)] == _OLE:
         fix = "save the sheet with the curves as CSV, any separator and decimal mark"

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import ModuleType
 
 from ...errors import RecordingError
-from ...files.door import reading
+from ...files.door import check_file, reading
 from ...files.whole import written
 from ..marker_data import MarkerData
 from ..recording_checks import check_seen
@@ -69,9 +69,7 @@ def _read(path: Path, units: str | None) -> MarkerData:
     if path.is_dir() and path.suffix.lower() not in FORMATS:
         return sidecar.apply(mesh_sequence.read(path), path, units, mesh_sequence.ASSUMED)
     file_format = _format(path)
-    if not path.is_file():
-        fix = "check the path; relative paths start at the working directory"
-        raise RecordingError("path", "is no file", str(path), fix)
+    check_file(path)
     if path.stat().st_size == 0:
         raise RecordingError(str(path), "is empty", "0 bytes", "export the recording again")
     return sidecar.apply(file_format.read(path), path, units, _assumed(file_format))

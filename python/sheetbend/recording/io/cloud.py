@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import RecordingError
-from ...files.door import check_room, reading
+from ...files.door import check_file, check_room, reading
 from ...files.whole import written
 from ..marker_data import MarkerData
 from ..recording_checks import check_points, padded
@@ -32,9 +32,7 @@ def load(path: Path, units: str | None = None) -> MarkerData:
     """
     with reading(path):
         _check_suffix(path)
-        if not path.is_file():
-            fix = "check the path; relative paths start at the working directory"
-            raise RecordingError("path", "is no file", str(path), fix)
+        check_file(path)
         return sidecar.apply(read(path), path, units)
 
 

@@ -48,7 +48,13 @@ _DELIMITERS = (",", ";", "\t")
 _AXES = columns.AXES
 _FRAME = re.compile(r"frames?|frame[_ ]?(?:#|no|nr|number|index|id)?|index|", re.IGNORECASE)
 _EMPTY = ' \t\r;,"'  # of lines without a filled cell
+MOST_CELLS = 1.5  # times those of the header: from there on, decimal commas are likely to have split cells
+DECIMAL_COMMAS = (
+    "if commas are the decimal mark and separate the cells too, export with semicolons or tabs between the cells, or "
+    "with decimal points"
+)
 _DECIMAL_COMMA = re.compile(r",(?=\d)")
+_THOUSANDS = re.compile(r"[-+]?\d{1,3}(,\d{3})+")
 
 
 def read(path: Path) -> MarkerData:
@@ -67,7 +73,8 @@ def read(path: Path) -> MarkerData:
         raise RecordingError(str(path), "has a header but no rows", "0 frames", "add one row per frame")
     for line, cells in rows:
         if len(cells) != len(header):
-            refuse(path, line, f"must have {len(header)} cells, like the header", len(cells))
+            fix = DECIMAL_COMMAS if len(cells) > MOST_CELLS * len(header) else "correct that line"
+            refuse(path, line, f"must have {len(header)} cells, like the header", len(cells), fix)
     told = clock.unit(header[0])
     times = _counted(path, rows) if told is None else clock.times(path, rows, told)
     if sorted(header[1:]) == ["marker", *_AXES]:
@@ -100,7 +107,13 @@ def _rows(path: Path, text: list[tuple[int, str]]) -> list[Row]:
         rows = [(number, cells[:-1]) for number, cells in rows]  # lines end in a delimiter
     if len(rows[0][1]) > 1 and _before_time(rows[0][1]):
         rows = [(number, cells[1:]) for number, cells in rows]
-    return rows if delimiter == "," else _with_points(rows)
+    return rows if delimiter == "," and not _quoted_decimals(rows) else _with_points(rows)
+
+
+def _quoted_decimals(rows: list[Row]) -> bool:
+    """Whether quoted cells between commas hold decimal commas, and not thousands."""
+    held = [cell for _, cells in rows[1:] for cell in cells if "," in cell]
+    return any(_THOUSANDS.fullmatch(cell) is None for cell in held)
 
 
 def _with_points(rows: list[Row]) -> list[Row]:
