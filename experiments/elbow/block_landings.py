@@ -17,10 +17,11 @@ from pathlib import Path
 
 import numpy as np
 import sheetbend as sb
-from block_cutting import cut
-from blocks import ARM, AXIS, HINGE, MASS, RATE, SIDES, Flight, level, leveled, second_block
-from sheetbend.arrays.rotations import matrices_of, rotation_matrix
+from block_cutting import read_and_cut
+from blocks import AXIS, HINGE, MASS, RATE, SIDES, Flight, leaning_of, level, leveled, second_block, start_of
+from sheetbend.arrays.rotations import matrices_of
 from sheetbend.quantities.quantities import Term
+from toss_files import again
 
 DATA = Path(__file__).parent / "data" / "tosses.npz"
 SCALE = 1.018  # of the data's lengths, from free flight
@@ -55,57 +56,30 @@ class Toss(Flight):
     free: int
     recorded_up: np.ndarray
 
-    def middle(self) -> np.ndarray:
-        """(frames, 3) m, between the centers of the blocks."""
-        return (self.positions + self.second()[0]) / 2.0
-
 
 def tosses(folder: Path | None = None) -> list[Toss]:
     """All of them, in the order of the source: the ones that are shipped, or those of a folder."""
-    data = np.load(DATA) if folder is None else cut(np.load(folder / "elbow_tosses.npz"))[1]
+    data = np.load(DATA) if folder is None else read_and_cut(folder)[1]
     x, q, angles = (data[key].astype(float) for key in ("positions", "quaternions", "angles"))
-    ends = zip(data["starts"][:-1], data["starts"][1:], data["toss"], data["free"], strict=True)
+    ends = zip(data["starts"][:-1], data["starts"][1:], data["toss"], data["free"], leaning_of(data), strict=True)
     return [
-        Toss(f"toss {n}", np.arange(b - a) / RATE, *leveled(n, x[a:b], q[a:b]), angles[a:b], int(free), level(n)[:, 2])
-        for a, b, n, free in ends
+        Toss(
+            name=f"toss {n}",
+            times=np.arange(b - a) / RATE,
+            positions=(poses := leveled(leans, x[a:b], q[a:b]))[0],
+            quaternions=poses[1],
+            angles=angles[a:b],
+            free=int(free),
+            recorded_up=level(leans)[:, 2],
+        )
+        for a, b, n, free, leans in ends
     ]
-
-
-@dataclass(frozen=True)
-class Start:
-    """State at a toss's first frame: what `Scene.add_body` takes of the first block, angle and rate of the hinge, and
-    place and velocity of the middle between the blocks, which alone falls as a point does."""
-
-    body: dict[str, np.ndarray]
-    angle: float
-    rate: float
-    middle: np.ndarray
-    velocity: np.ndarray
-
-
-def start_of(toss: Toss) -> Start:
-    few = slice(0, toss.free)
-    t = toss.times[few]
-    turns = sb.start_of_poses(t, toss.positions[few], toss.quaternions[few], DOWN)
-    spin = np.asarray(turns["spin"])
-    middle, velocity = np.polynomial.polynomial.polyfit(t, toss.middle()[few] - 0.5 * np.outer(t**2, DOWN), 1)
-    angle, rate = np.polynomial.polynomial.polyfit(t, toss.angles[few], 1)
-    frame = np.asarray(turns["rotation"])
-    hinge, arm = frame @ HINGE, frame @ rotation_matrix("angle", angle * np.array(AXIS)) @ ARM
-    swing = np.cross(spin, hinge) + np.cross(spin + rate * (frame @ AXIS), arm)
-    body = {
-        "at": middle - 0.5 * (hinge + arm),
-        "rotation": frame,
-        "velocity": velocity - 0.5 * swing,
-        "spin": spin,
-    }
-    return Start(body, float(angle), float(rate), middle, velocity)
 
 
 def scene_of(toss: Toss, height: float = 0.0) -> sb.Scene:
     """The blocks that fly from their first frames onto the table. `rounding` is the radius of their corners, m, and
     `stretch` what lengths are longer than SCALE makes them."""
-    start = start_of(toss)
+    start = start_of(toss, toss.free, DOWN)
     scene = sb.Scene(toss.name, gravity=DOWN)
     box, at, frame = sb.Inertia.box(MASS, SIDES / SCALE), start.body["at"], start.body["rotation"]
     centers, turned = second_block(at[None], frame[None], np.array([start.angle]))
@@ -192,7 +166,7 @@ def errors(toss: Toss, values: Mapping[str, float]) -> np.ndarray:
 
 def without_table(toss: Toss) -> np.ndarray:
     """Where the middle goes on as it flew until it is as low as it rests, and stays: (frames, 3) m."""
-    start = start_of(toss)
+    start = start_of(toss, toss.free, DOWN)
     along = start.middle + np.outer(toss.times, start.velocity) + 0.5 * np.outer(toss.times**2, DOWN)
     low = along @ toss.recorded_up < SIDES[2] / 2 / SCALE
     stops = int(low.argmax()) if low.any() else len(along) - 1
@@ -241,8 +215,8 @@ def main(folder: Path | None) -> None:
     for label, row in zip(guesses, plain, strict=True):
         print(f"others without physics, {label}: {row[0]:.0f} mm over time, {row[1]:.0f} at rest")
     if more:
-        known = {toss.name for toss in seen}
-        held_out = [toss for toss in more if toss.name not in known]
+        held_out = [toss for toss in more if not again(toss.positions, [own.positions for own in seen])]
+        print(f"{folder}: {len(more)} landings, {len(held_out)} that numbers are not from")
         flown = [toss for toss in held_out if toss.free >= FEWEST]
         report(f"others of {folder}", held_out, values)
         report(f"others of {folder} with {FEWEST} frames of free flight or more", flown, values)

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import sheetbend as sb
 from sheetbend.arrays.rotations import matrices_of, quaternions_of, rotation_matrix
 from sheetbend.quantities.quantities import product
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tosses"))
+
+from turning_axes import steady
 
 DATA = Path(__file__).parent / "data" / "flights.npz"
 RATE, MASS, SIDES = 148.0, 0.37, np.array([0.1, 0.05, 0.05])  # Hz, kg, m
@@ -46,6 +51,47 @@ class Flight:
         """Place (frames, 3) m and attitude (frames, 3, 3) of the second block, where its hinge is at `hinge` (3,) m."""
         return second_block(self.positions, matrices_of(self.quaternions), self.angles, hinge)
 
+    def middle(self) -> np.ndarray:
+        """(frames, 3) m, between the centers of the blocks."""
+        return (self.positions + self.second()[0]) / 2.0
+
+    def steady(self, rate: float) -> Flight:
+        """In axes that do not turn, where those of the recording turn about z at a rate (rad/s)."""
+        positions, quaternions = steady(self.times, self.positions, self.quaternions, rate)
+        return replace(self, positions=positions, quaternions=quaternions)
+
+
+@dataclass(frozen=True)
+class Start:
+    """State at a flight's first frame: what `Scene.add_body` takes of the first block, angle and rate of the hinge, and
+    place and velocity of the middle between the blocks, which alone falls as a point does."""
+
+    body: dict[str, np.ndarray]
+    angle: float
+    rate: float
+    middle: np.ndarray
+    velocity: np.ndarray
+
+
+def start_of(flight: Flight, frames: int, down: np.ndarray) -> Start:
+    """From a flight's first frames, in a gravity (3,) m/s^2."""
+    few = slice(0, frames)
+    t = flight.times[few]
+    turns = sb.start_of_poses(t, flight.positions[few], flight.quaternions[few], down)
+    spin = np.asarray(turns["spin"])
+    middle, velocity = np.polynomial.polynomial.polyfit(t, flight.middle()[few] - 0.5 * np.outer(t**2, down), 1)
+    angle, rate = np.polynomial.polynomial.polyfit(t, flight.angles[few], 1)
+    frame = np.asarray(turns["rotation"])
+    hinge, arm = frame @ HINGE, frame @ rotation_matrix("angle", angle * np.array(AXIS)) @ ARM
+    swing = np.cross(spin, hinge) + np.cross(spin + rate * (frame @ AXIS), arm)
+    body = {
+        "at": middle - 0.5 * (hinge + arm),
+        "rotation": frame,
+        "velocity": velocity - 0.5 * swing,
+        "spin": spin,
+    }
+    return Start(body, float(angle), float(rate), middle, velocity)
+
 
 def second_block(
     positions: np.ndarray, frames: np.ndarray, angles: np.ndarray, hinge: np.ndarray = HINGE
@@ -54,42 +100,47 @@ def second_block(
     return positions + frames @ hinge + turned @ ARM, turned
 
 
-def level(number: int) -> np.ndarray:
-    """The rotation (3, 3) from the recording's axes, of this toss of the source, to those of the table."""
-    if number >= LEVELED:
+def level(leans: bool) -> np.ndarray:
+    """The rotation (3, 3) from the recording's axes, which may lean, to those of the table."""
+    if not leans:
         return np.eye(3)
     axis = np.cross(UP, (0.0, 0.0, 1.0))
     sine = float(np.linalg.norm(axis))
     return rotation_matrix("table", np.arctan2(sine, UP[2]) / sine * axis)
 
 
-def leveled(number: int, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    turn = level(number)
+def leveled(leans: bool, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    turn = level(leans)
     return positions @ turn.T, quaternions_of(turn @ matrices_of(quaternions))
+
+
+def leaning_of(data: Mapping[str, np.ndarray]) -> np.ndarray:
+    """(tosses,) whether each was recorded in axes that lean; by its number in the source where nothing else says it."""
+    return data["leans"] if "leans" in data else data["toss"] < LEVELED
 
 
 def flights(data: Mapping[str, np.ndarray] | None = None) -> list[Flight]:
     """The shipped ones, or given ones of `block_cutting.cut`, in the order of the source; z is vertical."""
     data = np.load(DATA) if data is None else data
-    ends = zip(data["starts"][:-1], data["starts"][1:], data["toss"], strict=True)
+    ends = zip(data["starts"][:-1], data["starts"][1:], data["toss"], leaning_of(data), strict=True)
     x, q, angles = (data[key] for key in ("positions", "quaternions", "angles"))
-    return [Flight(f"toss {n}", np.arange(b - a) / RATE, *leveled(n, x[a:b], q[a:b]), angles[a:b]) for a, b, n in ends]
+    return [
+        Flight(f"toss {n}", np.arange(b - a) / RATE, *leveled(leans, x[a:b], q[a:b]), angles[a:b])
+        for a, b, n, leans in ends
+    ]
 
 
 def scene_of(flight: Flight, gravity: float = 9.81) -> tuple[sb.Scene, sb.Body, sb.Body]:
     """Two homogeneous boxes that fly from the first poses; gravity is the quantity `gravity`, m/s^2 in the recording's
     unit of length."""
     scene = sb.Scene(flight.name, gravity=(0.0, 0.0, 0.0))
-    few = slice(0, SEEN)
-    down = np.array([0.0, 0.0, -gravity])
-    start = sb.start_of_poses(flight.times[few], flight.positions[few], flight.quaternions[few], down)
-    angle, rate = np.polynomial.polynomial.polyfit(flight.times[few], flight.angles[few], 1)
-    at, frame = start["at"], start["rotation"]
-    centers, turned = second_block(at[None], frame[None], np.array([angle]))
+    start = start_of(flight, SEEN, np.array([0.0, 0.0, -gravity]))
+    at, frame = start.body["at"], start.body["rotation"]
+    centers, turned = second_block(at[None], frame[None], np.array([start.angle]))
     box = sb.Inertia.box(MASS, SIDES)
-    first = scene.add_body("first", of=box, **start)
+    first = scene.add_body("first", of=box, **start.body)
     second = scene.add_body("second", of=box, at=centers[0], rotation=turned[0])
-    sb.hinge(first, second, at=at + frame @ HINGE, axis=frame @ AXIS, rate=float(rate), viscosity=1e-4)
+    sb.hinge(first, second, at=at + frame @ HINGE, axis=frame @ AXIS, rate=start.rate, viscosity=1e-4)
     scene.add_quantity("gravity", gravity, "m/s^2")
     scene.add_terms([product("gravity", 2, -1.0, {"gravity": "identity"})])
     return scene, first, second

@@ -12,9 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import sheetbend as sb
-from block_cutting import cut
+from block_cutting import read_and_cut
 from blocks import RATE, SEEN, Flight, experiment, flights, parameters, scene_of
 from sheetbend.arrays.rotations import matrices_of
+from turning_axes import turning
 
 SHARED = ["gravity", "hinge_viscosity", *(f"{block}_center_{a}" for block in ("first", "second") for a in "xz")]
 
@@ -29,9 +30,10 @@ def angle_between(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.degrees(np.arccos(np.clip((np.trace(a.T @ b) - 1.0) / 2.0, -1.0, 1.0))))
 
 
-def predicted(flight: Flight, gravity: float, viscosity: float) -> list[float]:
-    """Errors at a flight's last frame of its prediction from the first frames: place (m) and attitude (degrees) of the
-    first block, then of the second."""
+def predicted(flight: Flight, gravity: float, viscosity: float, rate: float = 0.0) -> list[float]:
+    """Errors at a flight's last frame of its prediction from the first frames, in axes that do not turn: place (m) and
+    attitude (degrees) of the first block, then of the second."""
+    flight = flight.steady(rate)
     scene, *bodies = scene_of(flight, gravity)
     times = [0.0, float(flight.times[-1])]
     motion = sb.simulate(scene, times, sb.Solver(h=1 / (4 * RATE)), values={"hinge_viscosity": viscosity})
@@ -45,13 +47,17 @@ def predicted(flight: Flight, gravity: float, viscosity: float) -> list[float]:
 
 
 def main(count: int | None, folder: Path | None) -> None:
-    given = None if folder is None else cut(np.load(folder / "elbow_tosses.npz"))[0]
+    given = None if folder is None else read_and_cut(folder)[0]
     every = flights(given)[:count]
+    if len(every) < 2:
+        raise SystemExit(f"{len(every)} free flights are too few for two halves")
     middle = (len(every) + 1) // 2
     halves = [every[:middle], every[middle:]]
+    rates = [turning([(f.times, f.middle(), ()) for f in half]) for half in halves]
+    print("the axes turn about z by " + ", ".join(f"{rate:.3f} +- {half:.3f} rad/s" for rate, half in rates))
     found = []
-    for group in halves:
-        result = fitted(group)
+    for group, (rate, _) in zip(halves, rates, strict=True):
+        result = fitted([flight.steady(rate) for flight in group])
         found.append([result[name] for name in SHARED])
         print(f"{len(group)} flights, {group[0].name} to {group[-1].name}")
         for one in found[-1]:
@@ -61,8 +67,8 @@ def main(count: int | None, folder: Path | None) -> None:
     apart = abs(scales[0] / scales[1] - 1)
     print(f"scale of lengths from gravity: {scales[0]:.4f} and {scales[1]:.4f}, {apart:.2%} apart")
     errors = [
-        predicted(f, other[0].value, other[1].value)
-        for group, other in zip(halves, found[::-1], strict=True)
+        predicted(f, other[0].value, other[1].value, rate)
+        for group, other, (rate, _) in zip(halves, found[::-1], rates[::-1], strict=True)
         for f in group
     ]
     for k, block in enumerate(("first", "second")):

@@ -19,7 +19,7 @@ DATA = Path(__file__).parent / "data"
 
 
 def main(folder: Path) -> None:
-    flights, tosses = cut(np.load(folder / "elbow_tosses.npz"))
+    flights, tosses, _ = cut(np.load(folder / "elbow_tosses.npz"))
     told = json.loads((folder / "elbow_tosses.json").read_text())
     DATA.mkdir(exist_ok=True)
     np.savez_compressed(DATA / "flights.npz", **flights)

@@ -8,12 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import sheetbend as sb
-from cutting import cut
-from sheetbend.arrays.rotations import matrices_of, quaternions_of, rotation_matrix
+import turning_axes
+from cutting import RATE, read_and_cut
+from sheetbend.arrays.rotations import matrices_of
 from sheetbend.quantities.quantities import product
+from turning_axes import steady
 
 DATA = Path(__file__).parent / "data" / "flights.npz"
-RATE, MASS, SIDE = 148.0, 0.37, 0.1048  # Hz, kg, m
+MASS, SIDE = 0.37, 0.1048  # kg, m
 DRAG = 0.02  # N s/m, to start from
 CORNERS = SIDE / 2 * np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])  # four of them, a tetrahedron
 SIGMA = 5e-5  # m, of a corner
@@ -32,9 +34,7 @@ class Flight:
 
     def steady(self, rate: float) -> Flight:
         """In axes that do not turn, where those of the recording turn about z at a rate (rad/s)."""
-        back = np.array([rotation_matrix("turn", (0.0, 0.0, -rate * t)) for t in self.times])
-        x = np.einsum("tab,tb->ta", back, self.positions)
-        return Flight(self.name, self.times, x, quaternions_of(back @ matrices_of(self.quaternions)))
+        return Flight(self.name, self.times, *steady(self.times, self.positions, self.quaternions, rate))
 
     def about(self, center: np.ndarray) -> Flight:
         """Of a point (3,) m of the cube, such as its center of mass, instead of its middle."""
@@ -44,7 +44,7 @@ class Flight:
 
 def flights(folder: Path | None = None) -> list[Flight]:
     """All of them, in the order of the source: the ones that are shipped, or those of a folder."""
-    data = np.load(DATA) if folder is None else cut(np.load(folder / "cube_tosses.npz"))[0]
+    data = np.load(DATA) if folder is None else read_and_cut(folder)[0]
     ends = zip(data["starts"][:-1], data["starts"][1:], data["toss"], strict=True)
     return [
         Flight(f"toss {toss}", np.arange(b - a) / RATE, data["positions"][a:b], data["quaternions"][a:b])
@@ -53,27 +53,9 @@ def flights(folder: Path | None = None) -> list[Flight]:
 
 
 def turning(group: Sequence[Flight]) -> tuple[float, float]:
-    """How fast the axes of the recordings turn about z, rad/s, and its 95 % half-width by linear least squares.
-
-    Every flight has a start and a velocity of its own. Gravity, drag, the center of mass in the cube and the rate are
-    common to all.
-    """
-    columns, right = [], []
-    for flight in group:
-        t, x, frames = flight.times[:, None], flight.positions, matrices_of(flight.quaternions)
-        travelled = np.vstack([np.zeros(3), np.cumsum(0.5 * (x[1:] + x[:-1]), axis=0)]) / RATE
-        shared = [-0.5 * t**2 * [0.0, 0.0, 1.0], -travelled, *(-frames[:, :, k] for k in range(3))]
-        shared.append(t * np.cross([0.0, 0.0, 1.0], x))
-        own = np.linalg.qr(np.kron(np.hstack([np.ones_like(t), t]), np.eye(3)))[0]
-        every = np.stack([part.ravel() for part in (*shared, x)], axis=1)
-        every -= own @ (own.T @ every)
-        columns.append(every[:, :-1])
-        right.append(every[:, -1])
-    A, b = np.concatenate(columns), np.concatenate(right)
-    found = np.linalg.lstsq(A, b)[0]
-    left = b - A @ found
-    variance = left @ left / (len(b) - 6 * len(group) - len(found)) * np.linalg.inv(A.T @ A)[-1, -1]
-    return float(found[-1]), 1.96 * float(np.sqrt(variance))
+    """How fast the axes of the recordings turn about z, rad/s, and its 95 % half-width; the center of mass may be
+    anywhere in the cube."""
+    return turning_axes.turning([(f.times, f.positions, np.moveaxis(-matrices_of(f.quaternions), 2, 0)) for f in group])
 
 
 def scene_of(flight: Flight, gravity: float = 9.81, drag: float = DRAG) -> tuple[sb.Scene, sb.Body]:

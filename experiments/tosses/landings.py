@@ -19,11 +19,12 @@ from pathlib import Path
 
 import numpy as np
 import sheetbend as sb
-from cube import MASS, RATE, SIDE
-from cutting import cut
+from cube import MASS, SIDE
+from cutting import RATE, read_and_cut
 from scipy.optimize import minimize_scalar
 from sheetbend.arrays.rotations import matrices_of
 from sheetbend.quantities.quantities import Term
+from toss_files import again
 
 DATA = Path(__file__).parent / "data" / "tosses.npz"
 SCALE = 1.0176  # of the data's lengths, from free flight
@@ -73,7 +74,7 @@ class Toss:
 
 def tosses(folder: Path | None = None) -> list[Toss]:
     """All of them, in the order of the source: the ones that are shipped, or those of a folder."""
-    data = np.load(DATA) if folder is None else cut(np.load(folder / "cube_tosses.npz"))[1]
+    data = np.load(DATA) if folder is None else read_and_cut(folder)[1]
     x, q = (data[key].astype(float) for key in ("positions", "quaternions"))
     ends = zip(data["starts"][:-1], data["starts"][1:], data["toss"], data["free"], strict=True)
     return [Toss(f"toss {toss}", x[a:b], q[a:b], int(free)) for a, b, toss, free in ends]
@@ -204,10 +205,13 @@ def main(count: int, folder: Path | None) -> None:
         report(f"fitted, {len(rest)} others", rest, found, seen)
         report(f"authors, {len(rest)} others", rest, AUTHORS, seen)
     report(f"fitted to the first {AFTER[-1]} frames after contact alone, {len(rest)} others", rest, impact)
-    known = {toss.name for toss in data}
-    held_out = [toss for toss in more if toss.name not in known and toss.free >= FEWEST]
+    new = [toss for toss in more if not again(toss.positions, [own.positions for own in data])]
+    held_out = [toss for toss in new if toss.free >= FEWEST]
     if more:
-        print(f"{folder}: {len(more)} tosses, {len(held_out)} with {FEWEST} frames before contact that were not fitted")
+        print(
+            f"{folder}: {len(more)} landings, {len(new)} that were not fitted, {len(held_out)} of them with {FEWEST} "
+            "frames before contact"
+        )
     if held_out:
         for seen in (None, SEEN):
             report(f"fitted, {len(held_out)} of {folder}", held_out, found, seen)

@@ -15,7 +15,8 @@ from pathlib import Path
 
 import numpy as np
 import sheetbend as sb
-from cube import CORNERS, RATE, SEEN, Flight, experiment, flights, parameters, scene_of, turning
+from cube import CORNERS, SEEN, Flight, experiment, flights, parameters, scene_of, turning
+from cutting import RATE
 
 SHARED = ["gravity", "cube_drag", *(f"cube_center_{a}" for a in "xyz"), "cube_inertia_2", "cube_inertia_3"]
 GROUPS = 4
@@ -50,6 +51,8 @@ def predicted(
 
 def main(count: int | None, folder: Path | None) -> None:
     every = flights(folder)[:count]
+    if len(every) < 2 * GROUPS:
+        raise SystemExit(f"{len(every)} free flights are too few for {GROUPS} groups")
     found: dict[str, list[tuple[float, float]]] = {name: [] for name in SHARED}
     middle = len(every) // 2
     rates = [turning(half) for half in (every[:middle], every[middle:])]

@@ -68,6 +68,79 @@ def test_tosses_of_another_folder_are_cut_as_the_shipped_ones(tmp_path: Path) ->
         assert len(old.times) - old.free == frames - new.free  # the same first contact
 
 
+def nasty(x: np.ndarray, q: np.ndarray, free: int) -> list[tuple[np.ndarray, np.ndarray]]:
+    """What a folder may hold beside good tosses, from a good one with `free` frames before contact."""
+    hole, still, zero = x.copy(), x.copy(), q.copy()
+    hole[3, 1] = np.nan
+    still[:] = x[-1]
+    zero[5] = 0.0
+    return [
+        (x[:1], q[:1]),  # one frame
+        (x[:0], q[:0]),
+        (hole, q),
+        (x, zero),
+        (x[:free], q[:free]),  # no contact
+        (x[free + 2 :], q[free + 2 :]),  # begins in contact
+        (still, np.tile(q[-1], (len(q), 1))),
+        (x + np.array([0.01, 0.0, 0.0]), -3.0 * q),  # not normalized, of the other sign
+        (x, q),  # twice
+    ]
+
+
+def in_columns(parts: list[tuple[np.ndarray, np.ndarray]], numbers: np.ndarray) -> dict[str, np.ndarray]:
+    """Of the source: quaternions as (w, x, y, z)."""
+    places, turns = (np.concatenate(column) for column in zip(*parts, strict=True))
+    starts = np.cumsum([0, *(len(x) for x, _ in parts)])
+    return {"starts": starts, "toss": numbers, "position": places, "quaternion": turns[:, [3, 0, 1, 2]]}
+
+
+def test_what_a_folder_may_hold_is_left_out_with_a_word(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from cube import flights
+    from landings import errors, scene_of, tosses
+    from toss_files import again
+
+    shipped = tosses()[:10]
+    good = [(toss.positions, toss.quaternions) for toss in shipped]
+    parts = [*good, *nasty(*good[0], shipped[0].free)]
+    columns = in_columns(parts, 1000 - np.arange(len(parts)))
+    np.savez(tmp_path / "cube_tosses.npz", **columns)
+    found = tosses(tmp_path)
+    told = capsys.readouterr().out
+    assert f"{tmp_path}: 14 tosses, 12 free flights, 11 landings" in told
+    for number, why in (
+        (990, "1 frames"),
+        (989, "0 frames"),
+        (988, "no numbers"),
+        (987, "no numbers"),
+        (986, "never touches the table"),
+        (985, "begins on the table"),
+        (984, "begins on the table"),
+        (982, "is toss 1000 again"),
+    ):
+        assert any(line.endswith(why) and f"toss {number}:" in line for line in told.splitlines()), (number, why)
+    assert "quaternions were not of length one" in told
+    assert [toss.name for toss in found] == [f"toss {n}" for n in (*range(1000, 990, -1), 983)]
+    known = [toss.positions for toss in shipped]
+    assert [again(toss.positions, known) for toss in found] == [True] * 10 + [False]  # by its poses, not by its number
+    assert np.isfinite(errors(found[-1], {}, scene_of(found[-1], found[-1].free))).all()
+    assert len(flights(tmp_path)) == 12
+
+    np.savez(tmp_path / "cube_tosses.npz", **columns, rate_hz=120.0)
+    with pytest.raises(SystemExit, match="states 120 Hz"):
+        tosses(tmp_path)
+    np.savez(tmp_path / "cube_tosses.npz", **columns | {"position": columns["position"][:, :2]})
+    with pytest.raises(SystemExit, match="position has the shape"):
+        tosses(tmp_path)
+    (tmp_path / "cube_tosses.npz").write_bytes(b"no archive")
+    with pytest.raises(SystemExit, match="cannot be read"):
+        tosses(tmp_path)
+    every_second = in_columns([(x[::2], q[::2]) for x, q in good], np.arange(10))
+    np.savez(tmp_path / "cube_tosses.npz", **every_second)
+    capsys.readouterr()
+    tosses(tmp_path)
+    assert "flights fall with 3" in capsys.readouterr().out  # as 148 Hz would have it: the frames are of 74 Hz
+
+
 def test_first_frames_after_contact_tell_that_the_cube_is_hollow(monkeypatch: pytest.MonkeyPatch) -> None:
     """With half as many substeps as the experiment."""
     import landings

@@ -159,6 +159,10 @@ class Solver:
                 problem += f"{1e3 * f.reach:.3g} mm thick to each side, the contact's radius included"
                 fix = f"use at most {f.reach / f.speed:.2g} s, or a slower or thicker collider"
                 raise InputError("solver.h", problem, self.h, fix)
+        if self.method == "gauss_seidel" and scene.has_means:
+            problem = "leaves means of particles millimeters away from where they belong"
+            fix = "use 'newton', 'newton_cg', 'direct' or 'implicit' for scenes with sb.add_mean"
+            raise InputError("solver.method", problem, self.method, fix)
         if self.method == "direct" and self.sweeps == 1 and "shear" in scene.kinds:
             problem = "loses up to half of the digits of gradients of rods that shear (GA)"
             raise InputError("solver.iterations", problem, 1, "use 2, or leave GA out")

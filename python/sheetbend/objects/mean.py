@@ -22,8 +22,8 @@ def add_mean(
     What holds, loads or pulls it acts on all of them, each with its weight, and does not keep them in shape: pin it,
     give it a point mass or a force, or constrain it. A marker on it shows the mean.
 
-    The constraint `coincide` sums up to six nodes. Of more particles there are means of parts, hidden nodes. The sweeps
-    of "gauss_seidel" move them too slowly: use another method.
+    The constraint `coincide` sums up to six nodes. Of more particles there are means of parts, hidden nodes. Sweeps
+    move these light nodes too slowly, so the method "gauss_seidel" refuses such scenes.
 
     Args:
         scene: of the particles.

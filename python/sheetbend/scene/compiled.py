@@ -73,6 +73,7 @@ class CompiledScene:
         names: quantity names in the order of theta.
         theta: their values.
         contacts: names of those that particles may have with colliders.
+        has_means: whether it has particles at the mean of others.
         touches_itself: whether any rope or cloth may touch itself or another, or particles may hit each other.
         kinks: what beside contacts makes its motions not smooth in time, in words; empty if nothing.
         bends_over_values: whether any of it makes motions not smooth over quantities, either.
@@ -101,6 +102,7 @@ class CompiledScene:
         self._base = self._pack(scene)
         self._terms = scene.every_term
         self.contacts = tuple(c.name for c in scene.contacts.contacts)
+        self.has_means = bool(scene.means)
         self.touches_itself = bool(scene.contacts.pieces) or scene.contacts.balls is not None
         self.settled: dict[str, SettledStart] = {}
         self.fastest: tuple[Fastest, ...] = ()
