@@ -7,6 +7,7 @@ from functools import cache, partial
 
 from ..arrays.timeseries import Array
 from ..minimum.problem import FitProblem
+from .clipped import clipped
 from .cloth_size import cloth_sizes
 from .losses_at_zero import touches
 from .missing_parts import missing_parts
@@ -22,7 +23,7 @@ class Lacking:
     def __init__(self, problem: FitProblem, u: Array) -> None:
         self._experiments = problem.experiments
         self._parts = cache(partial(missing_parts, problem, u))
-        self._others = [cache(partial(made, problem, u)) for made in (cloth_sizes, pinned_ends, smoothed)]
+        self._others = [cache(partial(made, problem, u)) for made in (cloth_sizes, pinned_ends, smoothed, clipped)]
 
     def of(self, group: Sequence[int]) -> list[Told]:
         """The directions of a group of motions, each as an error of the model."""
