@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,10 +16,11 @@ from sheetbend.doubts.told import told_numbers
 from sheetbend.doubts.wrong_given import wrong_given
 from sheetbend.experiment.cut import borders
 from sheetbend.experiment.wanted import as_parameters
+from sheetbend.minimum import lifted_starts
 from sheetbend.minimum.continuity import joined, with_window
 from sheetbend.minimum.journal import Journal
 from sheetbend.minimum.lifted import Lifted
-from sheetbend.minimum.lifted_window import LiftedWindow, Seen
+from sheetbend.minimum.lifted_window import LiftedWindow, Rows, Seen
 from sheetbend.minimum.optimizers import walked
 from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.progress import Progress
@@ -316,18 +318,41 @@ def test_a_wrong_loss_is_doubted_after_single_steps_of_the_states(
     assert sum(made) <= 7 * 5  # of 5 windows; 12 * 5 where they follow to the end
 
 
-def test_ctrl_c_while_gaps_are_sought_keeps_the_point_reached_last() -> None:
+@pytest.mark.parametrize(
+    ("steps", "undone"),
+    [(1, "gaps between windows are given 10% of the motion's size"), (8, "gaps between windows are as wide as where")],
+)
+def test_ctrl_c_before_the_search_keeps_the_point_reached_last(steps: int, undone: str) -> None:
     reached: list[Progress] = []
 
     def press(progress: Progress) -> None:
         reached.append(progress)
-        if len(reached) == 8:
+        if len(reached) == steps:
             raise KeyboardInterrupt
 
     fit = sb.fit(swing(shooting=0.4), parameters=list(WANTED), progress=press)
-    assert fit.interrupted and not fit.result.converged and len(reached) == 8
+    assert fit.interrupted and not fit.result.converged and len(reached) == steps
     assert np.log(fit["arm_inertia"].value) == pytest.approx(reached[-1].u[0])
     assert fit.result.shot[0].loss > 0.0 and "best point so far" in fit.report()
+    assert f"interrupted before the search: {undone}" in " ".join(fit.report().split())
+
+
+def test_ctrl_c_while_windows_get_their_first_states_keeps_those_that_are_known(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    sought, nearest = list[np.ndarray](), lifted_starts._nearest
+
+    def press(rows: Callable[[np.ndarray], Rows | None], state: np.ndarray) -> np.ndarray:
+        sought.append(nearest(rows, state))
+        if len(sought) == 6:
+            raise KeyboardInterrupt
+        return sought[-1]
+
+    monkeypatch.setattr(lifted_starts, "_nearest", press)
+    fit = sb.fit(swing(shooting=0.4), parameters=list(WANTED))
+    assert fit.interrupted and fit["arm_inertia"].value == pytest.approx(0.0033)
+    left = fit.result.message.removeprefix("interrupted before the search: states at ")
+    assert left.endswith(" borders of windows were not sought") and 0 < int(left.split()[0]) < 19
 
 
 def test_windows_are_refused_where_they_cannot_be() -> None:

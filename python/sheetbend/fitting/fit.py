@@ -205,21 +205,21 @@ def fit(
     if leave_one_out:
         for e in fitted:
             companions(e, fitted, wanted)
-    experiments, found_at, stopped = joined(experiments, wanted, threads, progress)
+    experiments, found_at, undone = joined(experiments, wanted, threads, progress)
     fitted = _fitted(experiments)
-    if not stopped:
-        wanted, found_at, fields, stopped = settled(fitted, wanted, found_at, fields, threads, windows, progress)
+    if not undone:
+        wanted, found_at, fields, undone = settled(fitted, wanted, found_at, fields, threads, windows, progress)
     problem = FitProblem(fitted, wanted, threads=threads, expanded=found_at)
     problem.check_start()
     check_given(asked.given, problem)
     check_bootstrap(bootstrap, problem)
-    reached = reach(search, problem, beginnings, stopped)
+    reached = reach(search, problem, beginnings, undone)
     if fields and reached.left_its_end and not reached.interrupted:
         # Sizes and lengths came from the minimum that was left, so they are sought once more from the lower one.
         found_at = problem.parameters.starting_at(reached.best.u)
-        wanted, found_at, fields, stopped = settled(fitted, wanted, found_at, fields, threads, (), progress)
+        wanted, found_at, fields, undone = settled(fitted, wanted, found_at, fields, threads, (), progress)
         problem = FitProblem(fitted, wanted, threads=threads, expanded=found_at)
-        reached = reach(replace(search, windows=(), starts=()), problem, beginnings, stopped)
+        reached = reach(replace(search, windows=(), starts=()), problem, beginnings, undone)
     if reached.all_lost:
         asked = asked.without_refits()
     conclusion, left_out, interrupted = _concluded(reached, experiments, wanted, asked, leave_one_out)

@@ -59,18 +59,18 @@ class Reached:
         return len(self.lost) == len(self.problem.parameters.free)
 
 
-def reach(search: Search, problem: FitProblem, beginnings: bool, stopped: bool = False) -> Reached:
+def reach(search: Search, problem: FitProblem, beginnings: bool, undone: str = "") -> Reached:
     """Search, and search on.
 
     Args:
         beginnings: whether the beginnings of the motions are fitted by themselves, too.
-        stopped: whether Ctrl-C came before.
+        undone: what Ctrl-C left undone before.
 
     Raises:
         SheetbendError: no start has an answer.
     """
     rough = _rough(search, problem) if beginnings else search
-    found = rough.stopped(problem) if stopped else rough.run(problem)
+    found = rough.stopped(problem, undone) if undone else rough.run(problem)
     ends, interrupted, begun = found.ends, found.interrupted, tuple[Beginning, ...]()
     if not interrupted:
         try:

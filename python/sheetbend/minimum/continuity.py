@@ -56,10 +56,10 @@ class Loss:
 
 def joined(
     experiments: Sequence[Experiment], wanted: Parameters, threads: int, observe: Observer | None = None
-) -> tuple[list[Experiment], Parameters | None, bool]:
+) -> tuple[list[Experiment], Parameters | None, str]:
     """The experiments with all of their shooting known, the parameters, expanded, that they were found with, for a
-    search to begin at, or None where no experiment is shot in windows, and whether Ctrl-C ended this. Then all is as it
-    was at the point reached last; before gaps are sought there is none, and Ctrl-C passes through.
+    search to begin at, or None where no experiment is shot in windows, and what Ctrl-C left undone, if it came: then
+    all is as it was at the point reached last.
 
     Raises:
         InputError: see `shooting.cut`.
@@ -68,16 +68,15 @@ def joined(
     places = [i for i, e in enumerate(every) if e.predict is None]
     fitted = [every[i] for i in places]
     if not any(map(shot, fitted)):
-        return list(experiments), None, False
+        return list(experiments), None, ""
     parameters = expanded_to(wanted, fitted)
-    u = parameters.initial()
     size = {e.name: _size(e) for e in fitted}
     given = {e.name: own.loss for e in fitted if (own := shot(e)) is not None and own.is_given}
-    fitted, u = _nearer(fitted, wanted, parameters, threads, observe)
+    at = Latest(observe, parameters.initial())
+    fitted, undone = _nearer(fitted, wanted, parameters, threads, at)
     fitted = [_with_gap(e, LOOSE * size[e.name]) for e in fitted]
-    at, interrupted = Latest(observe, u), False
     try:
-        for _ in range(ROUNDS):
+        for _ in range(0 if undone else ROUNDS):
             problem = FitProblem(fitted, wanted, threads=threads, expanded=parameters)
             at.u = walked(problem, at.u, at)
             ok, _, _ = problem.evaluate(at.u)
@@ -98,30 +97,37 @@ def joined(
             if moved < SETTLED:
                 break
     except KeyboardInterrupt:
-        interrupted = True
+        undone = "gaps between windows are as wide as where the search for their size was stopped"
     for i, e in zip(places, fitted, strict=True):
         every[i] = e
-    return every, parameters.starting_at(at.u), interrupted
+    return every, parameters.starting_at(at.u), undone
 
 
 def _nearer(
-    experiments: Sequence[Experiment], wanted: Parameters, expanded: Parameters, threads: int, observe: Observer | None
-) -> tuple[list[Experiment], Array]:
-    """The experiments with states at every border, and a point, both from windows of a part of the length: far from the
-    parameters, the longer a window the less its states can follow the recording."""
+    experiments: Sequence[Experiment], wanted: Parameters, expanded: Parameters, threads: int, at: Latest
+) -> tuple[list[Experiment], str]:
+    """The experiments with states at every border, from windows of a part of the length: far from the parameters, the
+    longer a window the less its states can follow the recording. Also what Ctrl-C left undone.
+
+    Args:
+        at: the point from which, and to which this goes.
+    """
     parts = [_in_parts(e) for e in experiments]
-    u = expanded.initial()
-    short = [_with_gap(e, LOOSE * _size(e)) for e in begun([e for e, _ in parts], wanted, u)]
+    short, undone = begun([e for e, _ in parts], wanted, at.u)
+    short = [_with_gap(e, LOOSE * _size(e)) for e in short]
     problem = FitProblem(short, wanted, threads=threads, expanded=expanded)
-    u = walked(problem, u, observe)
-    problem.evaluate(u)
+    try:
+        at.u = at.u if undone else walked(problem, at.u, at)
+    except KeyboardInterrupt:
+        undone = f"gaps between windows are given {LOOSE:.0%} of the motion's size, and no smaller ones were sought"
+    problem.evaluate(at.u)
     found = []
     for i, (e, (_, count)) in enumerate(zip(experiments, parts, strict=True)):
         own, fine = shot(e), shot(_state(short[i], problem, i))
         if own is not None and fine is not None:
             e = replace(e, shooting=replace(own, states=own.states or fine.states[count - 1 :: count]))
         found.append(e)
-    return found, u
+    return found, undone
 
 
 def _in_parts(e: Experiment) -> tuple[Experiment, int]:

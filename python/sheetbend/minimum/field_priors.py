@@ -43,9 +43,9 @@ def settled(
     threads: int,
     windows: Sequence[float] | str = (),
     observe: Observer | None = None,
-) -> tuple[Parameters, Parameters | None, tuple[Field, ...], bool]:
-    """The parameters with the priors that are most likely, also expanded where the search begins, the fields, and
-    whether Ctrl-C ended this. Then all is as it was at the point reached last.
+) -> tuple[Parameters, Parameters | None, tuple[Field, ...], str]:
+    """The parameters with the priors that are most likely, also expanded where the search begins, the fields, and what
+    Ctrl-C left undone, if it came: then all is as it was at the point reached last.
 
     So many numbers explain a long motion nearly in a wrong minimum, too. So the first walk goes through windows.
 
@@ -54,9 +54,9 @@ def settled(
         windows: s, or "auto", see `fit`.
     """
     if not fields:
-        return wanted, expanded, (), False
+        return wanted, expanded, (), ""
     here, found = expanded_to(wanted, experiments) if expanded is None else expanded, tuple(fields)
-    at, interrupted, picture = Latest(observe, here.initial()), False, None
+    at, undone, picture = Latest(observe, here.initial()), "", None
     try:
         for k in range(ROUNDS):
             wanted, here = _carried(found, wanted), _carried(found, here)
@@ -77,8 +77,8 @@ def settled(
         if picture is not None:
             found = tuple(picture.bounded(found, i) for i in range(len(found)))
     except KeyboardInterrupt:
-        interrupted = True
-    return _carried(found, wanted), _carried(found, here).starting_at(at.u), found, interrupted
+        undone = "sizes and lengths of smooth priors are those at which the search for them was stopped"
+    return _carried(found, wanted), _carried(found, here).starting_at(at.u), found, undone
 
 
 def _carried(fields: Sequence[Field], parameters: Parameters) -> Parameters:

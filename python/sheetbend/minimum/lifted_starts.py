@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -22,29 +22,43 @@ from .problem import FitProblem
 FIRST, MORE = 3, 3  # frames of a window that its start is fitted to at first, and how many times as many next
 
 
-def begun(experiments: Sequence[Experiment], wanted: Parameters, u: Array) -> list[Experiment]:
+def begun(experiments: Sequence[Experiment], wanted: Parameters, u: Array) -> tuple[list[Experiment], str]:
     """The experiments with a state at every border: by least squares on the frames behind it, from the state at the
-    border before. A window that shows too little of its start begins where the one before ends.
+    border before. A window that shows too little of its start begins where the one before ends. Also what Ctrl-C left
+    undone: borders that were not reached have the state of the one before.
 
     Args:
         u: (free,) internal point of the parameters.
     """
     plain = FitProblem([replace(e, shooting=None) for e in experiments], wanted)
     assert plain.parameters.free == expanded_to(wanted, experiments).free
-    return [_begun(plain, i, e, u) if shot(e) else e for i, e in enumerate(experiments)]
+    found, missing, interrupted = list(experiments), 0, False
+    for i, e in enumerate(experiments):
+        own = shot(e)
+        if own is None or own.states:
+            continue
+        states = list[tuple[float, ...]]()
+        try:
+            for state in () if interrupted else _states(plain, i, e, u):
+                states.append(state)
+        except KeyboardInterrupt:
+            interrupted = True
+        left = len(borders(e)) - 2 - len(states)
+        missing += left
+        states += left * states[-1:]
+        found[i] = replace(e, shooting=replace(own, states=tuple(states)))
+    return found, f"states at {missing} borders of windows were not sought" if interrupted else ""
 
 
-def _begun(plain: FitProblem, i: int, e: Experiment, u: Array) -> Experiment:
+def _states(plain: FitProblem, i: int, e: Experiment, u: Array) -> Iterator[tuple[float, ...]]:
+    """At one border after the other."""
     own = shot(e)
-    assert own is not None
-    behind = own.behind or 0.0
-    if own.states:
-        return e
+    behind = 0.0 if own is None else own.behind or 0.0
     edges, recording, names = borders(e), e.fitted(), start_quantities(e.scene)
     quantities, free = of_one(e, plain.places, i)
     state = np.array([quantities[name] for name in names])
     first = [int(n) for n in np.searchsorted(recording.times, edges + behind - 1e-9)]
-    before, states = np.zeros(0), list[tuple[float, ...]]()
+    before = np.zeros(0)
     for k in range(1, len(edges) - 1):
 
         def window(frames: int, k: int = k) -> LiftedWindow:
@@ -63,8 +77,7 @@ def _begun(plain: FitProblem, i: int, e: Experiment, u: Array) -> Experiment:
             if ahead is not None:
                 state = _nearest(partial(_missed, parts[0], u, ahead.end.value), state)
         before = state
-        states.append(tuple(state.tolist()))
-    return replace(e, shooting=replace(own, states=tuple(states)))
+        yield tuple(state.tolist())
 
 
 def _missed(window: LiftedWindow, u: Array, end: Array, state: Array) -> Rows | None:

@@ -102,8 +102,11 @@ class Search:
             return self._raced(problem, name, points)
         return self._searched([_Way(self, problem, name, u) for u in points])
 
-    def stopped(self, problem: FitProblem) -> Found:
+    def stopped(self, problem: FitProblem, undone: str) -> Found:
         """What was found where Ctrl-C came before the search: where it would begin.
+
+        Args:
+            undone: what comes before a search and was not done, in words.
 
         Raises:
             KeyboardInterrupt: the motion has no answer there.
@@ -112,7 +115,8 @@ class Search:
         end = _Way(self, problem, name, u, u=u).interrupted()
         if end is None:
             raise KeyboardInterrupt
-        return Found((replace(end, first=end.cost),), name, True, growths(problem, u))
+        end = replace(end, first=end.cost, message=f"interrupted before the search: {undone}")
+        return Found((end,), name, True, growths(problem, u))
 
     def _searched(self, ways: Sequence[_Way]) -> Found:
         """One way after the other to its end."""
