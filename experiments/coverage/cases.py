@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 
+import chaotic_cases as chaotic
 import contact_cases as contact
 import numpy as np
 import population_cases as many
@@ -181,6 +182,7 @@ CASES: Mapping[str, Case] = {
     "cloth": Case("cloth, white noise", CLOTH, of_motion(cloth, 4, lambda: seen(cloth(4)), CLOTH)),
     "pull": Case("pulls of five specimens, white noise", PULL, pull),
     "population": Case("50 ropes with a spread of 10 %", many.TRUTH, many.fit_population, least=180, most=200),
+    "chaotic": Case("a double pendulum over 20 s, shot", chaotic.TRUTH, chaotic.fit, least=180, most=200),
     "contact_drag": Case(
         "rope dragged over a table", contact.DRAG, contact.twin(contact.drag, contact.DRAG), least=180, most=200
     ),

@@ -36,7 +36,7 @@ def lines(folder: Path, case: str) -> dict[int, dict]:
 
 
 def short(value: float | None) -> float | None:
-    return None if value is None else float(f"{value:.6g}")
+    return None if value is None else float(f"{value:.9g}")
 
 
 def draw(case: str, seeds: range, folder: Path) -> None:

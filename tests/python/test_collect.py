@@ -160,17 +160,30 @@ def test_one_command_fits_all_and_does_nothing_twice(ropes: Path) -> None:
     broken = ropes / "c.toml"
     good = broken.read_text()
     broken.write_text(good.replace('file = "c.npz"', 'file = "lost.npz"'))
+    none = ropes / "none.toml"
+    none.write_text(good.replace("[solver]", "[solver"), encoding="utf-8")
     out = ropes / "out"
-    told = last_line(run("fit", ropes / "*.toml", "--output", out, "--json"))
-    assert {name: code == 2 for name, code in told["fits"].items()} == {"a": False, "b": False, "c": True, "d": False}
+    told = run("fit", ropes / "*.toml", "--output", out, "--json")
+    codes = last_line(told)["fits"]
+    bad = {name: code == 2 for name, code in codes.items()}
+    assert bad == {str(none): True, "a": False, "b": False, "c": True, "d": False}
+    assert told.exit_code == 2 and f"{none}: is no valid TOML" in told.stderr
+    assert last_line(run("fit", ropes / "none*.toml", "--json"))["error"]["problem"].startswith("is no valid TOML")
+    assert (out / "none" / "error.txt").read_text().startswith(f"{none}: is no valid TOML")
+    without = last_line(run("collect", out, "--output", ropes / "part", "--json"))["without"]
+    assert list(without) == ["c", "none"] and "lost.npz" in without["c"]
+    none.unlink()
+    (out / "none" / "error.txt").unlink()
     before = {name: (out / name / "fit.json").stat().st_mtime_ns for name in "abd"}
     broken.write_text(good)
     done = run("fit", ropes / "*.toml", "--output", out)
     assert "4 configurations, 3 of them done" in done.stdout
     assert {name: (out / name / "fit.json").stat().st_mtime_ns for name in "abd"} == before
     assert (out / "c" / "fit.json").is_file()
+    again = last_line(run("fit", ropes / "*.toml", "--output", out, "--json"))["fits"]
+    assert all(again[name] == codes[name] for name in "abd")
     collected = last_line(run("collect", out, "--output", ropes / "all", "--json"))
-    assert collected["fits"] == ["a", "b", "c", "d"]
+    assert collected["fits"] == ["a", "b", "c", "d"] and collected["without"] == {}
     assert 1.8e-3 < math.exp(collected["population"]["rope_EI"]["found"]["mean"]) < 2.3e-3
     written = {path.name for path in (ropes / "all").iterdir()}
     assert written >= {"fits.csv", "parameters.tsv", "population.json", "population.txt"}

@@ -22,6 +22,7 @@ from sheetbend.minimum.journal import Journal
 from sheetbend.minimum.lifted import Lifted
 from sheetbend.minimum.lifted_window import LiftedWindow, Rows, Seen
 from sheetbend.minimum.optimizers import walked
+from sheetbend.minimum.parts import expanded_to
 from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.progress import Progress
 from sheetbend.statistics.chain import Chain, Gap, Window
@@ -190,6 +191,36 @@ def test_hard_continuity_gives_the_estimate_and_the_intervals_of_one_run() -> No
     assert shot.result.recordings[0].rms == pytest.approx(plain.result.recordings[0].rms, rel=1e-4)
     (motion,) = shot.result.shot
     assert motion.windows == 5 and motion.upper is None and motion.gap < 1e-6
+
+
+@pytest.mark.parametrize("seed", [1, 4, 9, 10])
+def test_first_states_of_a_whirling_double_pendulum_stay_near_its_motion(seed: int) -> None:
+    """Where places and velocities were sought together, rates ran off by 1e4 to 1e8 rad/s and never came back."""
+    rng, times = np.random.default_rng(seed), np.arange(401) / 200
+    start = dict(
+        zip(("upper", "lower"), np.reshape(rng.uniform([-3, -3, -15, -20], [3, 3, 15, 20]), (2, 2)).T, strict=True)
+    )
+
+    def arms(share: float) -> sb.Experiment:
+        scene = sb.Scene()
+        given = {name: {"angle": angle, "rate": rate} for name, (angle, rate) in start.items()}
+        upper = {"mass": 0.0938, "first_moment": 0.0102 * share, "inertia": 0.00154358, "length": 0.1727}
+        first = sb.add_arm(scene, "upper", **upper, **given["upper"])
+        lower = {"mass": 0.137596, "first_moment": 0.0161 * share, "inertia": 0.00316 * share, "length": 0.25}
+        second = sb.add_arm(scene, "lower", pivot=first, **lower, **given["lower"])
+        blank = sb.Recording(np.zeros((len(times), 2, 3)), times, markers=("m1", "m2"), name="whirl")
+        places = {"m1": first.place(0.1727), "m2": second.place(0.1168)}
+        return sb.Experiment(scene=scene, recording=blank, markers=places, solver=sb.Solver(h=1 / 400), axes="xz")
+
+    names = ["lower_inertia", *(f"{name}_{what}" for name in start for what in ("angle", "rate"))]
+    true, e = arms(1.0), arms(1.06)
+    problem = FitProblem([true], as_parameters(names, [true]))
+    x = problem.simulate(problem.parameters.initial())[0] + 1e-4 * rng.standard_normal((len(times), 2, 3))
+    cut = with_window(replace(e, recording=replace(e.recording, positions=x), shooting=0.125))
+    wanted = as_parameters(names, [cut])
+    ((found,), undone) = lifted_starts.begun([cut], wanted, expanded_to(wanted, [cut]).initial())
+    assert isinstance(found.shooting, sb.Shooting) and not undone
+    assert np.abs(np.array(found.shooting.states)[:, 1::2]).max() < 40.0
 
 
 def test_a_window_that_nothing_shows_begins_where_the_one_before_ends() -> None:

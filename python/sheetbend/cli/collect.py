@@ -16,7 +16,9 @@ from ..pictures.forest import plot_forest
 from ..pictures.plotting import save
 from ..report.collected import Collected
 from ..report.fit_result import FitResult
+from .ensemble import ERROR, RESULT
 from .folders import made
+from .journals import NAME
 from .outcome import Json, Outcome, run, strict
 from .targets import check_targets
 
@@ -51,9 +53,12 @@ def _collect(console: Console, results: list[Path], output: Path) -> Outcome:
     for file in dict.fromkeys(files):
         name = file.resolve().parent.name
         fits[name if name not in fits else str(file.parent)] = FitResult.load(file)
+    without = {name: words for path in results for name, words in _without(path).items()}
     found = Collected.of(fits)
     folder, report = made("--output", output), found.report()
     console.print("\n" + report, soft_wrap=True, end="")
+    for name, words in without.items():
+        console.print(f"no result of {name}: {words}", soft_wrap=True)
     write_text(folder / "fits.csv", found.table())
     write_text(folder / "parameters.tsv", found.petab())
     write_text(folder / "population.json", json_.dumps(strict(found.to_dict()), indent=2, allow_nan=False) + "\n")
@@ -66,14 +71,28 @@ def _collect(console: Console, results: list[Path], output: Path) -> Outcome:
         except MissingExtraError as error:
             console.print(f"no forest plot: {error}", soft_wrap=True)
     console.print(f"\nwritten to {folder}: {', '.join(names)}", soft_wrap=True)
-    return Outcome({"population": found.to_dict(), "fits": list(fits), "output": str(folder), "files": names})
+    return Outcome(
+        {"population": found.to_dict(), "fits": list(fits), "without": without, "output": str(folder), "files": names}
+    )
+
+
+def _without(path: Path) -> dict[str, str]:
+    """Why fits in the folders at a path have no result, by the name of the folder."""
+    folders = [] if path.is_file() else [path, *sorted(path.glob("*/"))]
+    found = {}
+    for folder in folders:
+        if (folder / ERROR).is_file():
+            found[folder.name] = (folder / ERROR).read_text(encoding="utf-8").rstrip()
+        elif (folder / NAME).is_file() and not (folder / RESULT).is_file():
+            found[folder.name] = "the fit did not come to its end"
+    return found
 
 
 def _fits_in(path: Path) -> list[Path]:
     """The fit.json at a path: itself, in the folder, or in the folders in there."""
     if path.is_file():
         return [path]
-    found = [path / "fit.json"] if (path / "fit.json").is_file() else sorted(path.glob("*/fit.json"))
+    found = [path / RESULT] if (path / RESULT).is_file() else sorted(path.glob(f"*/{RESULT}"))
     if not found:
         raise ConfigError("results", "hold no fit.json", str(path), "give the folders that `sheetbend fit` wrote to")
     return found

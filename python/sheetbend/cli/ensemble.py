@@ -6,6 +6,7 @@ import glob
 import io
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
+from contextlib import suppress
 from pathlib import Path
 
 from rich.console import Console
@@ -13,12 +14,14 @@ from rich.console import Console
 from ..config import GrippedConfig, parse_any
 from ..errors import ConfigError, SheetbendError
 from ..files.door import noting, reading
+from ..files.whole import UnwrittenError, write_text
 from ..minimum.workers import naming_losses
+from ..report.fit_result import FitResult
 from .journals import NAME
-from .outcome import Code, Outcome
+from .outcome import Code, Outcome, code_of
 from .screen import Screen
 
-RESULT = "fit.json"
+RESULT, ERROR = "fit.json", "error.txt"
 WORST_FIRST = (Code.TERMINATED, Code.INTERRUPTED, Code.BAD_INPUT, Code.NOT_CONVERGED, Code.NOT_IDENTIFIABLE)
 Single = Callable[[Console, Path, Path, bool], Outcome]
 
@@ -26,19 +29,24 @@ Single = Callable[[Console, Path, Path, bool], Outcome]
 def fit_all(
     console: Console, pattern: str, output: Path, strict: bool, single: Single, executor: Executor | None
 ) -> Outcome:
-    """Fit every configuration of a pattern, each into OUTPUT/NAME. One that fails is told, and the others go on.
+    """Fit every configuration of a pattern, each into OUTPUT/NAME. The error of one that fails is printed and written
+    to OUTPUT/NAME/error.txt, and the others go on.
 
     Args:
         single: fits one of them: (console, configuration, folder, strict) -> outcome.
         executor: does several at the same time; None for one after the other.
 
     Raises:
-        ConfigError: the pattern names no configuration, one is none, or two have the same name.
+        ConfigError: the pattern names no configuration, or two have the same name.
     """
-    tasks = _tasks(pattern, output)
+    tasks, unread = _tasks(pattern, output)
     left = [(path, folder) for path, folder in tasks if not _done(path, folder)]
     console.print(f"{len(tasks)} configurations, {len(tasks) - len(left)} of them done", soft_wrap=True)
-    codes: dict[str, Code] = {folder.name: Code.DONE for path, folder in tasks if (path, folder) not in left}
+    for path, folder in tasks:
+        if folder != output / path.stem:  # where the error of a file without a name was
+            (output / path.stem / ERROR).unlink(missing_ok=True)
+    codes = {str(path): _failed(console, output / path.stem, error) for path, error in unread.items()}
+    codes |= {folder.name: _code(folder, strict) for path, folder in tasks if (path, folder) not in left}
     futures: list[Future[tuple[str, Code]]] = []
     try:
         if executor is not None:
@@ -64,22 +72,29 @@ def fit_all(
     return Outcome(data, worst)
 
 
-def _tasks(pattern: str, output: Path) -> list[tuple[Path, Path]]:
-    """Configurations in the order of their names, and their folders."""
+def _tasks(pattern: str, output: Path) -> tuple[list[tuple[Path, Path]], dict[Path, ConfigError]]:
+    """Configurations in the order of their names, with their folders, and what is wrong with files that are none."""
     paths = [Path(name) for name in sorted(glob.glob(pattern, recursive=True)) if Path(name).is_file()]
     if not paths:
         raise ConfigError(
             "config", "names no file", pattern, "give a pattern of configurations, such as 'ropes/*.toml'"
         )
     taken: dict[str, Path] = {}
+    unread: dict[Path, ConfigError] = {}
     for path in paths:
-        with reading(path, ConfigError):
-            name = parse_any(path).experiment.name
+        try:
+            with reading(path, ConfigError):
+                name = parse_any(path).experiment.name
+        except ConfigError as error:
+            unread[path] = error
+            continue
         if name in taken:
             fix = f"give each a name of its own; {taken[name]} has it too"
             raise ConfigError(f"{path}: experiment.name", "is another one's", name, fix)
         taken[name] = path
-    return [(path, output / name) for name, path in taken.items()]
+    if not taken:
+        raise next(iter(unread.values()))
+    return [(path, output / name) for name, path in taken.items()], unread
 
 
 def _done(path: Path, folder: Path) -> bool:
@@ -97,13 +112,28 @@ def _done(path: Path, folder: Path) -> bool:
 
 
 def _told(single: Single, console: Console, path: Path, folder: Path, strict: bool) -> Code:
-    """The code of one fit; an error of the package is printed."""
+    """The code of one fit; an error of the package is told."""
     try:
         with noting():
-            return single(console, path, folder, strict).code
+            code = single(console, path, folder, strict).code
     except SheetbendError as error:
-        console.print(f"{path}: {error}", soft_wrap=True)
-        return Code.BAD_INPUT if isinstance(error, ConfigError) else Code.NOT_CONVERGED
+        return _failed(console, folder, error, f"{path}: ")
+    (folder / ERROR).unlink(missing_ok=True)
+    return code
+
+
+def _failed(console: Console, folder: Path, error: SheetbendError, ahead: str = "") -> Code:
+    """Print an error, write it into the folder of the fit, and return its code."""
+    console.print(f"{ahead}{error}", soft_wrap=True)
+    with suppress(OSError, UnwrittenError):
+        folder.mkdir(parents=True, exist_ok=True)
+        write_text(folder / ERROR, f"{ahead}{error}\n")
+    return Code.BAD_INPUT if isinstance(error, ConfigError) else Code.NOT_CONVERGED
+
+
+def _code(folder: Path, strict: bool) -> Code:
+    """The code of a fit that was made before."""
+    return code_of([FitResult.load(folder / RESULT)], strict)
 
 
 def _apart(single: Single, path: Path, folder: Path, strict: bool) -> tuple[str, Code]:

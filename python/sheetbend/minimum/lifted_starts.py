@@ -14,6 +14,7 @@ from ..experiment.cut import borders, shot, start_quantities
 from ..experiment.experiment import Experiment
 from ..optional import require
 from ..quantities.parameters import Parameters
+from ..scene.scene import Scene
 from .lifted import of_one
 from .lifted_window import LiftedWindow, Rows
 from .parts import expanded_to
@@ -58,7 +59,7 @@ def _states(plain: FitProblem, i: int, e: Experiment, u: Array) -> Iterator[tupl
     quantities, free = of_one(e, plain.places, i)
     state = np.array([quantities[name] for name in names])
     first = [int(n) for n in np.searchsorted(recording.times, edges + behind - 1e-9)]
-    before = np.zeros(0)
+    before, placing = np.zeros(0), [name in _placing(e.scene) for name in names]
     for k in range(1, len(edges) - 1):
 
         def window(frames: int, k: int = k) -> LiftedWindow:
@@ -69,6 +70,8 @@ def _states(plain: FitProblem, i: int, e: Experiment, u: Array) -> Iterator[tupl
         while not parts or len(parts) < 1 + math.ceil(math.log(count / FIRST, MORE)):
             parts.append(window(min(count, FIRST * MORE ** len(parts))))
         if any(part.rows > len(names) for part in parts[:-1]):
+            # Places first: from places far off, those that are seen move velocities the wrong way, and by any amount.
+            state = _nearest(partial(window(1).data, u), state, placing)
             for part in parts:
                 if part.rows >= len(names):
                     state = _nearest(partial(part.data, u), state)
@@ -80,14 +83,31 @@ def _states(plain: FitProblem, i: int, e: Experiment, u: Array) -> Iterator[tupl
         yield tuple(state.tolist())
 
 
+def _placing(scene: Scene) -> set[str]:
+    """Names of the quantities that set places at the start."""
+    return {name for term in scene.every_term if term.array == "position" for name in term.quantities}
+
+
 def _missed(window: LiftedWindow, u: Array, end: Array, state: Array) -> Rows | None:
     """Residuals by which the start of a window misses the end of the one before."""
     rows = window.start(u, state)
     return None if rows is None else replace(rows, value=rows.value - end)
 
 
-def _nearest(rows: Callable[[Array], Rows | None], state: Array) -> Array:
-    """The state with the least squares, from one beside it."""
+def _nearest(rows: Callable[[Array], Rows | None], state: Array, free: Sequence[bool] | None = None) -> Array:
+    """The state with the least squares, from one beside it, of which perhaps only some numbers are free."""
+    if free is not None:
+        moving = np.flatnonzero(free)
+
+        def some(part: Array) -> Rows | None:
+            whole = state.copy()
+            whole[moving] = part
+            found = rows(whole)
+            return None if found is None else replace(found, state=found.state[:, moving])
+
+        found = state.copy()
+        found[moving] = _nearest(some, state[moving])
+        return found
     known: dict[bytes, Rows | None] = {}
 
     def at(s: Array) -> Rows | None:
