@@ -92,7 +92,7 @@ struct Approach : Moment<S> {
     const S passed = S(1.0) - (f.left - t) / S(rule.h);
     const Vec3<S> direction = rule.curved ? velocity : (S(1.0) / f.left) * (f.x_end - f.x);
     const auto between = [&](const Vec3<S>& a, const Vec3<S>& b) { return a + passed * (b - a); };
-    const Vec3<S> z = between(s.now.in_frame(at), s.next.in_frame(at));
+    const Vec3<S> z_now = s.now.in_frame(at), z_next = s.next.in_frame(at), z = between(z_now, z_next);
     S place[3], n[3];
     z.store(place);
     distance_from(rule.shape, place, s.size, gap, n);
@@ -100,7 +100,9 @@ struct Approach : Moment<S> {
     const auto turned = [&](const Vec3<S>& own) { return between(s.now.turned(own), s.next.turned(own)); };
     normal = turned(unit_normal(rule.shape, Vec3<S>(n)));
     surface_velocity = S(1.0 / rule.h) * ((s.next.position + s.next.turned(z)) - (s.now.position + s.now.turned(z)));
-    rate = dot(turned(Vec3<S>(n)), direction - surface_velocity);
+    // Not -n . surface_velocity where it turns: that is the same to first order alone, and the time of the impact needs the derivative.
+    rate = dot(Vec3<S>(n), S(1.0 / rule.h) * (z_next - z_now) +
+                               between(s.now.turned_back(direction), s.next.turned_back(direction)));
   }
 };
 

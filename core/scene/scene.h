@@ -95,13 +95,13 @@ struct Contact {
   bool rebounds(int item) const { return !held.empty() && held[item]; }
 };
 
-// A particle that bounces: no constraint holds it.
+// A particle that bounces. No constraint holds it, unless it is a ball.
 struct Bouncer {
   int node;
   std::vector<int> contacts;  // off which it does
 };
 
-// Particles with a radius that hit each other. No constraint holds them.
+// Particles with a radius that hit each other.
 struct Balls {
   std::vector<Bouncer> members;
   std::size_t first_radius = 0;  // in Quantity::contact_radius, one for each

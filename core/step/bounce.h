@@ -1,4 +1,5 @@
-// Particles that no constraint holds bounce off colliders with restitution (core/contact/impact.h), and balls hit each other (core/step/ball_flights.h).
+// Particles that no constraint holds bounce off colliders with restitution (core/contact/impact.h), and balls hit each other (core/step/ball_flights.h),
+// whether constraints hold them or not: those move them afterwards.
 // Where the free end of a substep is past a surface that its start was not, the projection begins at the end of the flight that the impact leaves, outside the
 // surface; other contacts act from there. An approach that is too slow to bounce is left to the projection as a contact without restitution.
 #pragma once

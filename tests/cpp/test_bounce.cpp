@@ -205,6 +205,42 @@ TEST_P(Bouncing, SlipsWithoutFrictionHoweverLittle) {
     }
 }
 
+// The time of an impact has its derivative from one step of Newton's method: the rate has to be that of the gap, also where the surface turns.
+TEST(Bounce, MeetsATurningSurfaceAtTheRateOfItsGap) {
+  Random random(7);
+  const auto vector = [&](double size) {
+    return size * Vec3<double>(random(-1.0, 1.0), random(-1.0, 1.0), random(-1.0, 1.0));
+  };
+  for (const bool curved : {false, true})
+    for (const auto& [name, sizes] : {std::pair{"plane", std::vector<double>{}},
+                                      {"sphere", {0.1}},
+                                      {"capsule", {0.1, 0.2}},
+                                      {"rounded_box", {0.2, 0.1, 0.15, 0.02}}}) {
+      constexpr double h = 0.01, t = 0.004;
+      Surface<double> s;
+      std::copy(sizes.begin(), sizes.end(), s.size);
+      for (Pose<double>* pose : {&s.now, &s.next}) {
+        pose->position = vector(0.05);
+        turn_by(vector(1.0), pose->turn);
+      }
+      Flight<double> f{{0.4, 0.3, 0.5}, vector(5.0), {}, vector(5.0), 0.9 * h};
+      f.x_end = f.x + (0.5 * f.left) * (f.v + f.v_end);
+      const ImpactRule rule{shape_of(name), h, curved};
+      Flight<Complex> f_probe;
+      Surface<Complex> s_probe;
+      std::vector<double> numbers;
+      Flight<double>::each(f, [&](double a) { numbers.push_back(a); });
+      Surface<double>::each(s, [&](double a) { numbers.push_back(a); });
+      std::size_t i = 0;
+      Flight<Complex>::each(f_probe, [&](Complex& a) { a = Complex(numbers[i++]); });
+      Surface<Complex>::each(s_probe, [&](Complex& a) { a = Complex(numbers[i++]); });
+      Complex probe(t);
+      probe.im = complex_step;
+      const double expected = Approach<Complex>(rule, f_probe, s_probe, probe).gap.im / complex_step;
+      EXPECT_NEAR(Approach<double>(rule, f, s, t).rate, expected, 1e-12 * std::abs(expected)) << name << curved;
+    }
+}
+
 TEST(Bounce, IsRefusedOfWhatIsHeldAndSoft) {
   ContactBuilder b;
   b.particle({0.0, 0.0, 0.1}, 0.1), b.particle({0.1, 0.0, 0.1}, 0.1);

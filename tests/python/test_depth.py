@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from commands import last_line, run
+from sheetbend.mesh import equilateral
 from sheetbend.motion.depth import too_deep
 
 RADIUS, GRAVITY = 0.005, 9.81
@@ -47,6 +48,53 @@ def test_a_rope_at_rest_lies_as_deep_as_its_contact_is_stiff(integrator: Literal
     rest = GRAVITY * SOLVER.h**2 / 1000  # docs/contact_law.md
     assert RADIUS + lift - end == pytest.approx(rest, rel=1e-2)
     assert rest < deepest(scene, solver) < 20 * rest + 2 * lift / 0.1 * SOLVER.h / 1000
+
+
+def falling(what: str, speed: float) -> tuple[sb.Scene, float]:
+    """A rope, a cloth or a box that falls on a table, and its mass over that of the lightest point that touches."""
+    scene = sb.Scene("falling")
+    thing: object
+    if what == "box":
+        sides, turn = (0.1, 0.1, 0.12), (0.5, 0.3, 0.0)
+        inertia = sb.Inertia.box(0.4, sides)
+        thing = scene.add_body(
+            "box", of=inertia, at=(0, 0, 0.12), rotation=turn, velocity=(1, 0, -speed), spin=(3, 5, 1)
+        )
+        scene.add_contact(thing, sb.Plane(name="table"), friction=0.3, points=sb.box_corners(sides))
+        moments = 0.4 / 12 * np.array([0.1**2 + 0.12**2, 0.1**2 + 0.12**2, 0.1**2 + 0.1**2])
+        axes = moments.sum() / 2 - moments  # masses
+        return scene, 0.4 * (1 / 0.4 + (np.array([0.05, 0.05, 0.06]) ** 2 / axes).sum())
+    if what == "cloth":
+        mesh = equilateral(0.2, 0.2, 6)
+        x, y = np.asarray(mesh.vertices)[:, :2].T
+        places = np.column_stack([x, y * np.cos(1.0), 0.0201 + y * np.sin(1.0)])
+        down = np.outer(np.ones(len(x)), [0, 0, -speed])
+        cloth = sb.add_cloth(
+            scene, mesh, "cloth", positions=places, density=0.2, warp=400.0, shear=100.0, bending=1e-5, velocity=down
+        )
+        scene.add_contact(cloth, sb.Plane(name="table"), friction=0.3, radius=0.001)
+        masses = scene.compiled.inputs()[scene.compiled.layout["mass"][0] + cloth.particles]
+        return scene, float(masses.sum() / masses.min())
+    way = {"rope": (1, 0, 0), "leaning rope": (1, 0, 1), "upright rope": (0, 0, 1)}[what]
+    rope = sb.add_rope(
+        scene, length=0.4, segments=20, density=0.05, EA=1e4, EI=1e-4, start=(0, 0, 0.0241), direction=way,
+        velocity=np.outer(np.ones(21), [1, 0, -speed]),
+    )  # fmt: skip
+    scene.add_contact(rope, sb.Plane(name="table"), friction=0.3, radius=0.004)
+    return scene, 1.0 if what == "rope" else 40.0
+
+
+@pytest.mark.parametrize("integrator", ["bdf1", "bdf2"])
+@pytest.mark.parametrize("what", ["rope", "leaning rope", "upright rope", "cloth", "box"])
+def test_an_impact_goes_in_no_deeper_than_the_mass_that_it_stops(
+    what: str, integrator: Literal["bdf1", "bdf2"]
+) -> None:
+    h, speed = 1e-3, 5.0
+    scene, share = falling(what, speed)
+    motion = sb.simulate(scene, h * np.arange(40), sb.Solver(h=h, method="implicit", integrator=integrator))
+    found = motion.contacts["table"].deepest
+    assert found is not None
+    assert 0.9 * speed * h / 1000 < found < (speed + 5 * h * GRAVITY) * h / 1000 * share  # docs/contact_law.md
 
 
 def test_a_soft_contact_gives_way_by_weight_over_stiffness() -> None:
@@ -164,7 +212,9 @@ def test_the_command_that_simulates_warns(depth: float, tmp_path: Path, monkeypa
     x[:, :, 2] = RADIUS + 1e-3 - (depth + 1e-3) * np.clip(TIMES / 0.1, 0.0, 1.0)[:, None] ** 2
     sb.Recording(positions=x, times=TIMES, markers=("a", "d", "b", "e", "c"), name="press").save("press.npz")
     Path("press.toml").write_text(CONFIGURATION)
+    told = run("simulate", "press.toml").stdout
+    assert "Contacts" in told and "sliding" in told and "of 5" in told
     result = run("simulate", "press.toml", "--json")
-    found = last_line(result)["simulated"]["press"]["deepest"]["table"]
+    found = last_line(result)["simulated"]["press"]["contacts"]["table"]["deepest"]
     assert ("contact 'table' does not hold what it touches" in " ".join(result.stderr.split())) == (depth > 0)
     assert (found > 0.5e-3) == (depth > 0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,6 +15,7 @@ from rich.console import Console
 from ..config import Study, load, scene_alone
 from ..config.driven_motion import as_simulated
 from ..config.errors import located
+from ..doubts.touching import touches_of
 from ..errors import ConfigError
 from ..experiment.checks import check_substep
 from ..experiment.experiment import Experiment
@@ -28,6 +29,9 @@ from ..motion.simulate import simulate as run_simulation
 from ..motion.solver import Solver
 from ..pictures.movie import Motion, movie_paths, save_movie
 from ..recording.recording import Recording
+from ..report.report_contact import touches_section
+from ..report.tables import plain_section
+from ..result.motions import ContactFit
 from ..scene.body import GROUND
 from ..scene.scene import Scene
 from .folders import made
@@ -190,7 +194,8 @@ def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None, mo
         told = f"{task.name} begins at the given start: a configuration does not hold the estimated one"
         warnings.warn(told, stacklevel=2)
     motion = motion_of(task)
-    depths = {contact: counts.deepest for contact, counts in motion.contacts.items() if counts.deepest is not None}
+    touches = touches_of(task.name, task.scene, motion) if motion.contacts else []
+    depths = {c.contact: c.deepest for c in touches if c.deepest is not None}
     for words in too_deep(task.scene, None, depths):
         warnings.warn(f"in the motion of {task.name} {words}", stacklevel=2)
     path = folder / f"{task.name}.npz"
@@ -217,7 +222,7 @@ def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None, mo
         "largest_displacement": float(moved.max()),
         "largest_speed": float(np.linalg.norm(motion.velocities, axis=2).max()),
         "largest_force": {group: float(np.abs(values).max()) for group, values in motion.forces.items()},
-        "deepest": depths,
+        "contacts": {c.contact: _numbers(c) for c in touches},
         **more,
     }
     told = (
@@ -232,7 +237,14 @@ def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None, mo
     )
     files = ", ".join([str(path), *(file for made in more.values() for file in made)])
     console.print(f"  {task.name}: {summary['particles']} particles, {told}{reach}; {files}", soft_wrap=True)
+    if touches:
+        console.print("\n".join(["", *plain_section(touches_section(touches))]), soft_wrap=True, highlight=False)
     return summary
+
+
+def _numbers(touching: ContactFit) -> dict[str, Any]:
+    numbers = asdict(touching)
+    return {key: numbers[key] for key in numbers if key not in ("recording", "contact")}
 
 
 def _poses(task: Task, motion: Trajectory) -> dict[str, np.ndarray]:

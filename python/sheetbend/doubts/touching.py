@@ -20,6 +20,7 @@ from ..motion.depth import too_deep
 from ..motion.simulate import Trajectory, simulate
 from ..result.estimate import Estimate
 from ..result.motions import ContactFit, Kinks
+from ..scene.scene import Scene
 from ..statistics.least_squares import solved
 
 
@@ -28,29 +29,32 @@ def what_touches(problem: FitProblem, u: Array) -> tuple[ContactFit, ...]:
 
     Takes one simulation of each experiment that has contacts; a motion that has no answer is left out.
     """
+    runs = zip(problem.experiments, _runs(problem, u), strict=True)
+    return tuple(row for e, run in runs if run is not None for row in touches_of(e.name, e.scene, run))
+
+
+def touches_of(recording: str, scene: Scene, motion: Trajectory) -> list[ContactFit]:
+    """What every contact of one motion does."""
     rows = []
-    for e, run in zip(problem.experiments, _runs(problem, u), strict=True):
-        if run is None:
-            continue
-        for name, size in e.scene.contacts.counted().items():
-            counts, start = run.contacts[name], e.scene.compiled.settled.get(name)
-            rows.append(
-                ContactFit(
-                    recording=e.name,
-                    contact=name,
-                    particles=size,
-                    most=counts.most,
-                    began=counts.began,
-                    ended=counts.ended,
-                    sliding=counts.sliding_share,
-                    sticking=counts.sticking_share,
-                    bdf1=counts.bdf1_share,
-                    settled=0 if start is None else start.particles,
-                    settled_by=0.0 if start is None else start.farthest,
-                    deepest=counts.deepest,
-                )
+    for name, size in scene.contacts.counted().items():
+        counts, start = motion.contacts[name], scene.compiled.settled.get(name)
+        rows.append(
+            ContactFit(
+                recording=recording,
+                contact=name,
+                particles=size,
+                most=counts.most,
+                began=counts.began,
+                ended=counts.ended,
+                sliding=counts.sliding_share,
+                sticking=counts.sticking_share,
+                bdf1=counts.bdf1_share,
+                settled=0 if start is None else start.particles,
+                settled_by=0.0 if start is None else start.farthest,
+                deepest=counts.deepest,
             )
-    return tuple(rows)
+        )
+    return rows
 
 
 def pressed_in(problem: FitProblem, u: Array, contacts: Sequence[ContactFit]) -> tuple[str, ...]:

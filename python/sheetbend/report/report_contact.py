@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 from ..quantities.wording import short
+from ..result.motions import ContactFit
 from ..result.result import FitData
 from .tables import Section
 
@@ -12,10 +16,14 @@ LOSSES = "a drag or damping that the model lacks is looked for to first order, s
 
 def contact_sections(result: FitData) -> list[Section]:
     """The two sections on contacts; empty where nothing can touch."""
-    return [_contacts(result), _kinks(result)]
+    touching = touches_section(result.contacts)
+    if touching.rows:
+        touching = replace(touching, notes=(*touching.notes, ("losses", LOSSES)))
+    return [touching, _kinks(result)]
 
 
-def _contacts(result: FitData) -> Section:
+def touches_section(contacts: Sequence[ContactFit]) -> Section:
+    """What touches in motions; empty where nothing can."""
     rows = [
         (
             c.recording,
@@ -28,7 +36,7 @@ def _contacts(result: FitData) -> Section:
             _percent(c.bdf1),
             "" if c.deepest is None else _depth(c.deepest),
         )
-        for c in result.contacts
+        for c in contacts
     ]
     headers = ("recording", "contact", "most at once", "began", "ended", "sliding", "sticking", "bdf1", "deepest")
     notes = (
@@ -36,14 +44,13 @@ def _contacts(result: FitData) -> Section:
         ("self-contact", "counted in pairs where it has friction, out of those that there is room for"),
         ("bdf1", "share of the substeps of backward Euler, which damps vibrations"),
         ("deepest", "particle inside the shape at any frame, counted from the contact's radius"),
-        ("losses", LOSSES),
         *(
             (
                 f"start of {c.recording}",
                 f"settle moved {c.settled} particle{'s' * (c.settled > 1)} out of {c.contact}, "
                 f"by up to {_mm(c.settled_by)} mm",
             )
-            for c in result.contacts
+            for c in contacts
             if c.settled
         ),
     )

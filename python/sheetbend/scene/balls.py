@@ -16,7 +16,7 @@ TOUCHES = 1e-6  # m: so deep two may be in each other at the start
 
 @dataclass(frozen=True, eq=False)
 class Balls:
-    """Free particles that hit each other.
+    """Particles that hit each other.
 
     Attributes:
         name: under which their collisions are counted.

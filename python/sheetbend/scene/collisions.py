@@ -26,14 +26,14 @@ class CollidingScene(SelfTouchingScene):
         restitution: float,
         name: str = "balls",
     ) -> None:
-        """Let free particles hit each other like smooth balls; see docs/contact.md.
+        """Let particles hit each other like smooth balls; see docs/contact.md.
 
         Each impact is computed at its time within the substep, and several impacts in one substep in the order of their
         times. Momentum is kept. Works with every method of the solver. Once per scene, with all particles that may hit
         each other; they bounce off shapes if `add_contact` has them too.
 
         Args:
-            what: (n,) particles; free ones that no constraint holds.
+            what: (n,) particles, also balls on strings and the centers of bodies; none that is pinned or driven.
             radius: m, one for all (`<name>_contact_radius`), or one for each (`<name>_contact_radius_0` and so on).
             restitution: speed after an impact over that before, along the line of the centers; 0 to 1
                 (`<name>_restitution`).
@@ -41,7 +41,7 @@ class CollidingScene(SelfTouchingScene):
 
         Raises:
             SceneError: fewer than two particles, particles that are listed twice, radii or a restitution out of range;
-                when the scene is compiled: particles that are held, or that start inside each other.
+                when the scene is compiled: particles that are pinned or driven, or that start inside each other.
         """
         self._building()
         if self.contacts.balls is not None:
