@@ -74,7 +74,8 @@ def main(law: str) -> None:
                 square = np.einsum("dk,kl,dl->d", e, J.T @ J / len(J), e)
                 off.append(np.sqrt(square / NOISE**2 + 1.0))
             every = np.concatenate(off)
-            words.append(f"{40 * (every <= 1.2).mean():.1f}, {np.median(every):.2f}")
+            scatter = np.sqrt(20.0) * (np.stack(off) <= 1.2).sum(axis=0).std()  # of 20 draws of two pieces
+            words.append(f"{40 * (every <= 1.2).mean():.1f} +- {scatter:.1f}, {np.median(every):.2f}")
         print(f"{seconds:.1f} s of {SECONDS:g} | {words[0]} | {words[1]}", flush=True)
 
 

@@ -145,6 +145,7 @@ def test_configurations_in_the_texts_load(block: str, tmp_path: Path) -> None:
     motion = sb.simulate(sb.rope(1.0, 10, density=0.05, EI=1e-3), [k / 20 for k in range(21)])
     for file in ("swing.npz", "drag.npz"):
         sb.Recording(positions=motion.positions, times=motion.times).save(tmp_path / file)
+    sb.Recording(motion.positions[:, :1], motion.times, markers=("pointer",)).save(tmp_path / "door.npz")
     study = config.load(tmp_path / "text.toml")
     assert study.experiments and study.parameters
 

@@ -139,19 +139,19 @@ def scene_of(seed: int) -> tuple[sb.Scene, sb.Solver, str]:
     return scene, sb.Solver(h=H, method=method), ", ".join(parts)
 
 
-def differs(seed: int) -> tuple[dict[str, float], str]:
+def differs(seed: int, given: sb.Solver | None = None) -> tuple[dict[str, float], str]:
     """By input array, how far the adjoint is from the complex step along a direction of all of its entries, relative to
     the largest that the two may be; and what the scene is made of."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         scene, solver, parts = scene_of(seed)
-        compiled = scene.compiled
+        compiled, solver = scene.compiled, given or solver
         core, inputs, steps = solver.core(compiled), compiled.inputs(), [1, SUBSTEPS]
         rng = np.random.default_rng(seed)
         with divergence(scene):
             x, tape = core.record(inputs, steps, 0.0)
-        weights = rng.standard_normal(x.shape)
-        adjoint = core.vjp(inputs, tape, steps, weights, 0.0)
+            weights = rng.standard_normal(x.shape)
+            adjoint = core.vjp(inputs, tape, steps, weights, 0.0)
         found = {}
         for name, (first, size) in compiled.layout.items():
             own = slice(first, first + size)

@@ -184,7 +184,7 @@ class Solver:
                 problem += " as these do not say, and the forces between them grow without a bound"
                 fix = "leave out keep_spin, or what is there twice, such as the second hinge of a door"
                 raise SceneError(scene.name, problem, which, fix)
-            warn_redundant(scene.name, which)
+            warn_redundant(scene.name, which, turning="rigid" in scene.kinds and self.method != "implicit")
         return core
 
 
