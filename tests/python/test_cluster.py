@@ -75,34 +75,44 @@ def test_the_bits_do_not_depend_on_the_workers(client: Any, alone: str, count: i
     assert bits(sb.fit(several(2), **SMALL, executor=executor)) == alone
 
 
-def test_a_fit_goes_on_where_a_worker_is_killed(client: Any, alone: str) -> None:
-    """One that is a process of its own, as soon as it has work; what it had goes to one of the others."""
+def test_a_fit_goes_on_where_workers_are_killed(client: Any, alone: str) -> None:
+    """Three that are processes of their own, one after the other as soon as it has work; what it had goes to others."""
     stays = next(iter(client.scheduler_info(n_workers=-1)["workers"]))
     command = [sys.executable, "-m", "dask", "worker", client.scheduler.address, "--no-nanny", "--nthreads", "1"]
-    with subprocess.Popen([*command, "--name", "own", "--no-dashboard"], stderr=subprocess.DEVNULL) as process:
-        client.wait_for_workers(4)
+    processes = {
+        name: subprocess.Popen([*command, "--name", name, "--no-dashboard"], stderr=subprocess.DEVNULL)
+        for name in ("own 1", "own 2", "own 3")
+    }
+    done, killed = threading.Event(), list[str]()
+    try:
+        client.wait_for_workers(6)
         workers = client.scheduler_info(n_workers=-1)["workers"]
-        own = next(address for address, told in workers.items() if told["name"] == "own")
-        executor, done = client.get_executor(workers=[stays, own], retries=3, pure=False), threading.Event()
+        own = {address: told["name"] for address, told in workers.items() if told["name"] in processes}
+        executor = client.get_executor(workers=[stays, *own], retries=3, pure=False)
 
         def kill() -> None:
-            while not client.processing([own])[own]:
-                if done.wait(0.005):
-                    return
-            process.send_signal(signal.SIGKILL)
+            for address, name in own.items():
+                while not client.processing([address])[address]:
+                    if done.wait(0.005):
+                        return
+                processes[name].send_signal(signal.SIGKILL)
+                processes[name].wait()
+                killed.append(address)
 
         killer = threading.Thread(target=kill)
         killer.start()
-        try:
-            found = [bits(sb.fit(several(2), **SMALL, executor=executor))]
-            while killer.is_alive() and len(found) < 5:  # until the worker had a task when it was asked
-                found.append(bits(sb.fit(several(2), **SMALL, executor=executor)))
-        finally:
-            done.set()
-            killer.join()
+        found = [bits(sb.fit(several(2), **SMALL, executor=executor))]
+        while killer.is_alive() and len(found) < 5:  # until each had a task when it was asked
+            found.append(bits(sb.fit(several(2), **SMALL, executor=executor)))
+        done.set()
+        killer.join()
+    finally:
+        done.set()
+        for process in processes.values():
             process.kill()
-    assert process.returncode == -signal.SIGKILL and found == [alone] * len(found)
-    assert own not in client.scheduler_info(n_workers=-1)["workers"] and len(found) < 5
+            process.wait()
+    assert len(killed) == 3 and found == [alone] * len(found)
+    assert not set(killed) & set(client.scheduler_info(n_workers=-1)["workers"])
 
 
 def test_workers_of_another_version_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
