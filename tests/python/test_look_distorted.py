@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import pytest
 import sheetbend as sb
 import takes
 from commands import run
+from sheetbend.look import Take, draft, seen
 
 Array = np.ndarray
 Table = tuple[Array, Array, list[str]]
@@ -170,6 +172,13 @@ def test_frames_that_repeat_the_one_before_are_told(tmp_path: Path) -> None:
     assert content and told and 5 <= int(told[1]) <= len(k) - len(r.times)  # of a rope that hardly moves it is no sign
     said, _ = outcome(tmp_path / "plain", (r.positions, r.times, list(r.markers)))
     assert "repeat the one before" not in said
+
+
+def test_one_frame_is_looked_at_without_a_warning(tmp_path: Path) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = draft([Take(seen(sb.Recording.load(EXPERIMENTS / "wires/data/black_1.npz")), "wire.npz")], "wire")
+    assert found.kind == "a rope at rest"
 
 
 def test_a_marker_that_jumps_is_no_exchange_with_an_end_of_the_line() -> None:

@@ -176,8 +176,10 @@ def _repeated(s: Seen) -> int:
     """Frames in which nothing has moved at all, between two in which it moves about as fast as ever; 0 of few."""
     x = np.nan_to_num(s.recording.positions).reshape(len(s.recording.times), -1)
     step = np.abs(np.diff(x, axis=0)).max(axis=1)
+    if not step.any():  # shapes at rest, or one frame
+        return 0
     moves = step > 0.5 * np.median(step)
-    again = np.flatnonzero((step[1:-1] == 0.0) & moves[:-2] & moves[2:]) if step.any() else []
+    again = np.flatnonzero((step[1:-1] == 0.0) & moves[:-2] & moves[2:])
     return len(again) if len(again) >= REPEATED else 0
 
 

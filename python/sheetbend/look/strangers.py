@@ -43,7 +43,7 @@ def restless(recording: Recording, noise: Array) -> Strangers | None:
         noise: (markers,) m, that of each.
     """
     x, count = recording.positions, len(noise)
-    if count < FEWEST:
+    if count < FEWEST or not np.isfinite(noise).any():
         return None
     found, spread = [], np.sqrt(np.nanvar(x, axis=0).mean(axis=1))
     for k in np.flatnonzero((noise > RESTLESS * np.nanmedian(noise)) & (noise > WHITE * spread)):
