@@ -8,7 +8,7 @@ FOLDER/rope_1.json with the true values. A recording depends on the seed, its ro
 
 With --nasty the ropes have what real ones showed (`true_ropes`), some training files are spoiled (`spoil`), every other
 rope is written as lists of lists of numbers, and the JSON also tells what the true values miss of the eval recordings.
-With --strange it writes four ropes of which the recipe has no model (`strange`), with --laboratory four that change,
+With --strange it writes four ropes of which the recipe has no model (`strange`), with --laboratory five that change,
 slip, roll or lose time as those of a laboratory do (`laboratory`).
 """
 

@@ -243,18 +243,19 @@ def _place(s: Seen, own: list[int], flat: Array, k: int, apart: float) -> Array 
     """(2,) m, where another marker is beside the flat cloth, as the markers next to it lie; None where it is far from
     them or moves against them."""
     x = s.recording.positions
-    whole = np.flatnonzero(np.isfinite(x[:, [k, *own], 0]).all(axis=1))
-    if not len(whole):
+    beside = np.isfinite(x[:, own, 0]) & np.isfinite(x[:, k, :1])
+    frame = int(np.argmax(beside.sum(axis=1)))  # the first with the most of them
+    seen = np.flatnonzero(beside[frame])
+    if len(seen) < AROUND:
         return None
-    frame = x[whole[0]]
-    distance = np.linalg.norm(frame[own] - frame[k], axis=1)
-    near = np.argsort(distance)[:AROUND]
+    distance = np.linalg.norm(x[frame, own] - x[frame, k], axis=1)
+    near = seen[np.argsort(distance[seen])[:AROUND]]
     nearest = float(distance[near[0]])
     varies = float(np.nanstd(np.linalg.norm(x[:, own[near[0]]] - x[:, k], axis=1)))
     if nearest > REACHES * apart or varies > LOOSE * max(nearest, apart):
         return None
-    axes, mean, center = laid(flat[near], frame[own][near])
-    return np.asarray(mean + axes @ (frame[k] - center))
+    axes, mean, center = laid(flat[near], x[frame, own][near])
+    return np.asarray(mean + axes @ (x[frame, k] - center))
 
 
 def _side(flat: Array, at: Array, sides: Sequence[str]) -> tuple[str, float]:

@@ -15,6 +15,7 @@ from .seen import Seen
 from .take import Description, Measured, Take
 from .text import comment, joined, table
 
+REPEATED = 3  # frames like the one before from which on it is told
 FEWEST = 3  # markers of anything but a pendulum
 OF_ONE_MODEL = (
     ("poses", cloth, "are for a cloth that a robot holds", "leave them out: a rope takes markers on what holds it"),
@@ -141,6 +142,11 @@ def _told(takes: Sequence[Take], up: str | None) -> list[str]:
     x = first.recording.positions
     box = np.nanmax(x, axis=(0, 1)) - np.nanmin(x, axis=(0, 1))
     said.append(f"the markers fill a box of {' x '.join(f'{v:.3g}' for v in box)} m")
+    if again := _repeated(first):
+        said.append(
+            f"{again} frames repeat the one before while all moves on: the camera, or who filled its gaps, wrote them "
+            "twice. Leave them out of the file, with their times if these count on"
+        )
     if first.speed > 0:
         said.append(f"the fastest marker moves at {first.speed:.2g} m/s")
         far, near = first.speed * _step(first.recording.times), _neighbors(first)
@@ -164,6 +170,17 @@ def _told(takes: Sequence[Take], up: str | None) -> list[str]:
         axis = ("-" if first.gravity[down] > 0 else "") + "xyz"[down]
         said.append(f"{axis} points up, as {'the file says' if first.up_by == 'file' else 'given'}")
     return said
+
+
+def _repeated(s: Seen) -> int:
+    """Frames in which nothing has moved at all, between two in which it moves about as fast as ever; 0 of few."""
+    x = np.nan_to_num(s.recording.positions).reshape(len(s.recording.times), -1)
+    step = np.abs(np.diff(x, axis=0)).max(axis=1)
+    if not step.any():  # shapes at rest, or one frame
+        return 0
+    moves = step > 0.5 * np.median(step)
+    again = np.flatnonzero((step[1:-1] == 0.0) & moves[:-2] & moves[2:])
+    return len(again) if len(again) >= REPEATED else 0
 
 
 def _neighbors(s: Seen) -> float:

@@ -237,7 +237,7 @@ def _upright(take: Take, joints: list[int]) -> bool:
     off = r.positions[:, joints] - np.nanmean(r.positions[:, joints[0]], axis=0)
     wide = np.nanmax(np.abs(off), axis=(0, 1))
     normal, down = int(np.argmin(wide)), np.nanmean(off[:, 1], axis=0)
-    if wide[normal] >= FLAT * s.apart[joints[0], joints[1]]:
+    if wide[normal] >= max(FLAT * s.apart[joints[0], joints[1]], CHANCE * s.noise):
         return False
     up = int(np.argmax(np.abs(down))) if s.up_by == "guess" else int(np.argmax(np.abs(s.gravity)))
     if normal == 1 and down[2] > HANGS * s.apart[joints[0], joints[1]]:

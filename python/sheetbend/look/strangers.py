@@ -15,10 +15,11 @@ from .text import joined
 Array = np.ndarray
 RARE = 0.2  # of the frames in which the best one is seen: a marker seen in fewer is a reflection, or a stray
 RESTLESS, WILD = 10.0, 0.1  # noise of a reflection: times that of the others, and of the size of what they show
+WHITE = 0.5  # of its spread, the noise of a marker that goes from anywhere to anywhere
 FAR = 3.0  # times the distance between neighbors: markers of one object, and of what holds it, are nearer
 OUTSIDE = 0.5  # of the size of what moves: how far a mark of the room is from it
 KEEPS = 0.2  # of the distance between neighbors, and of their motion: by so much that of a holder changes at most (sd)
-FEWEST = 3  # markers of an object
+FEWEST = 3  # markers of which one can be a stranger
 
 
 class Strangers(NamedTuple):
@@ -42,10 +43,10 @@ def restless(recording: Recording, noise: Array) -> Strangers | None:
         noise: (markers,) m, that of each.
     """
     x, count = recording.positions, len(noise)
-    if count <= FEWEST:
+    if count < FEWEST or not np.isfinite(noise).any():
         return None
-    found = []
-    for k in np.flatnonzero(noise > RESTLESS * np.nanmedian(noise)):
+    found, spread = [], np.sqrt(np.nanvar(x, axis=0).mean(axis=1))
+    for k in np.flatnonzero((noise > RESTLESS * np.nanmedian(noise)) & (noise > WHITE * spread)):
         others = np.delete(x, k, axis=1)
         size = np.linalg.norm(np.subtract(*np.nanquantile(others, [0.99, 0.01], axis=(0, 1))))
         found += [int(k)] if noise[k] > WILD * size else []
@@ -59,14 +60,14 @@ def of_the_room(recording: Recording, still: Array, distance: Array) -> Stranger
         still: (markers,) whether each stays in place.
         distance: (frames, markers, markers) m.
     """
-    moving = np.flatnonzero(~still)
-    if len(moving) < FEWEST or len(moving) == len(still):
+    moving, resting = np.flatnonzero(~still), np.flatnonzero(still)
+    if len(still) < FEWEST or not len(moving) or not len(resting):
         return None
     mean, varies = np.nanmean(distance, axis=0), np.nanstd(distance, axis=0)
     moved = np.sqrt(np.nanvar(recording.positions, axis=0).sum(axis=1))
     among = mean[np.ix_(moving, moving)] + np.where(np.eye(len(moving), dtype=bool), np.inf, 0.0)
-    spacing = float(np.median(among.min(axis=1)))
-    resting = np.flatnonzero(still)
+    alone = len(moving) == 1  # as the end of a pendulum
+    spacing = float(mean[np.ix_(moving, resting)].min() if alone else np.median(among.min(axis=1)))
     nearest = moving[np.argmin(mean[np.ix_(resting, moving)], axis=1)]
     away = mean[resting, nearest]
     holds = (away <= FAR * spacing) | (varies[resting, nearest] <= KEEPS * np.minimum(moved[nearest], spacing))

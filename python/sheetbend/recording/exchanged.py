@@ -24,6 +24,7 @@ TOO_LONG = 1.25  # times its median: a distance between neighbors that material 
 JUMP = 0.1  # weight of a jump, squared over the distance between neighbors
 CHANGE = 0.3  # of a path, for each change
 GAIN = 1.5  # by which a path with changes is at least cheaper: three frames with one distance twice as long
+RIGHT = 0.5  # of a frame's cost, at most, that the exchange leaves on average
 LEFT = 0.25  # of the cost of these frames, at most, that the exchange leaves
 
 
@@ -45,7 +46,7 @@ def put_back_neighbors(t: Array, positions: Array, names: Sequence[str]) -> tupl
     joined, _ = tree(apart, tuple(range(count)))
     for a in range(count):
         for b in sorted(k for k in joined[a] if k > a):
-            beside = [(a, k) for k in joined[a] - {b}] + [(b, k) for k in joined[b] - {a}]
+            beside = [(j, k) for j, other in ((a, b), (b, a)) for k in joined[j] - {other} or {_next(apart, j, other)}]
             for first, last in _pieces(x, a, b, beside, apart):
                 x[first : last + 1, [a, b]] = x[first : last + 1, [b, a]]
                 said.append(
@@ -53,6 +54,11 @@ def put_back_neighbors(t: Array, positions: Array, names: Sequence[str]) -> tupl
                     "their distances to their neighbors would be far too long: put back"
                 )
     return x, said
+
+
+def _next(apart: Array, a: int, b: int) -> int:
+    """The nearest marker to a beside b: at an end too, a marker that is elsewhere has distances that are too long."""
+    return int(np.argmin(np.where(np.isin(np.arange(len(apart)), (a, b)), np.inf, apart[a])))
 
 
 def _pieces(x: Array, a: int, b: int, beside: list[tuple[int, int]], apart: Array) -> list[tuple[int, int]]:
@@ -91,6 +97,7 @@ def _pieces(x: Array, a: int, b: int, beside: list[tuple[int, int]], apart: Arra
         if j - i < len(x)  # labels that are exchanged in all frames are not found
         and (before := cost[0, i:j].sum()) - cost[1, i:j].sum() > GAIN
         and cost[1, i:j].sum() < LEFT * before
+        and cost[1, i:j].mean() < RIGHT  # else one of them is elsewhere
     ]
 
 
