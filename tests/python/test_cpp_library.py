@@ -118,7 +118,9 @@ def test_the_examples_are_short_and_the_page_shows_the_first() -> None:
 
 
 @pytest.mark.slow
-def test_the_pages_programs_build_and_run_in_a_project_of_their_own(installed: Path, tmp_path: Path) -> None:
+def test_the_pages_programs_build_and_run_in_a_project_of_their_own(
+    installed: Path, examples: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """With what docs/cpp.md says and nothing else: its scene, its programs, its lines for CMake."""
     page = (ROOT / "docs/cpp.md").read_text()
     own = [text for text in re.findall(r"```cpp\n(.*?)```", page, re.DOTALL) if "rope_gradient" not in text][-2:]
@@ -133,21 +135,20 @@ def test_the_pages_programs_build_and_run_in_a_project_of_their_own(installed: P
     run("cmake", "-S", tmp_path, "-B", tmp_path / "b", f"-DCMAKE_PREFIX_PATH={installed}")
     run("cmake", "--build", tmp_path / "b")
 
-    (line,) = re.findall(r"scene = (sb\.rope\(.*\))", page)
-    scene = eval(line, {"sb": sb})
-    sb.save_scene(scene, tmp_path / "rope.scene")
-    times = np.arange(41) / 80
-    true = {"rope_EI": 2e-3, "rope_drag_linear": 8e-3}
-    x = sb.simulate(scene, times, sb.Solver(h=1 / 240), true).positions[:, [12, 20]].reshape(len(times), -1)
-    np.savetxt(tmp_path / "markers.csv", np.column_stack([times, x]), delimiter=",")
+    (block,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    given: dict[str, Any] = {}
+    exec(block, given)
 
     def shown(name: str) -> str:
         return subprocess.run([tmp_path / "b" / name], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
 
     said = dict(line.split() for line in shown("fit").splitlines()[1:])
     assert float(said["EI"]) == pytest.approx(2e-3, rel=1e-3) and float(said["drag"]) == pytest.approx(8e-3, rel=1e-2)
-    end = sb.simulate(scene, [0.0, 0.5], sb.Solver(h=1 / 240)).positions[-1, 20, 2]
+    end = sb.simulate(given["scene"], [0.0, 0.5], sb.Solver(h=1 / 240)).positions[-1, 20, 2]
     assert f"after 0.5 s the end is at z = {end:.6g} m" in shown("steps")
+    (printed,) = re.findall(r"```text\n(.*?)```", page, re.DOTALL)
+    assert gradient_of(run(examples / "rope_gradient", "rope.scene")) == pytest.approx(gradient_of(printed), rel=1e-6)
 
 
 # A rope's gradient.
