@@ -89,6 +89,18 @@ def test_meshes_from_files(tmp_path, make, suffix):
         assert set(found.sets["skin"]) == set(mesh.surface[1])
 
 
+@pytest.mark.parametrize("fmt", ["gmsh22", "gmsh"])
+def test_values_that_meshio_writes_as_numpy_shows_them(tmp_path, fmt):
+    """Text files with data of nodes or elements hold "np.float64(1.0)", which meshio refused as unmatched data."""
+    meshio = pytest.importorskip("meshio")
+    box, path = sb.mesh.tetrahedra(BOX, (2, 1, 1)), tmp_path / "box.msh"
+    values = {"heat": np.linspace(-1.5e-7, 1.0, len(box.vertices))}
+    content = meshio.Mesh(box.vertices, [("tetra", box.elements)], values, {"strain": [np.ones(len(box.elements))]})
+    meshio.write(path, content, file_format=fmt, binary=False)
+    found = sb.mesh.read_solid(path)
+    assert found.vertices == approx(box.vertices) and (found.elements == box.elements).all()
+
+
 def test_files_that_are_no_solid(tmp_path):
     meshio = pytest.importorskip("meshio")
     box = sb.mesh.bricks(BOX, (1, 1, 1))

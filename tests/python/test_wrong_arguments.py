@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import inspect
 import math
 import re
@@ -15,6 +16,7 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.arrays.checks import check_count, is_number, some_indices
+from sheetbend.optional import MissingExtraError
 from wrong_calls import CALLS
 
 LONGEST = 20.0  # s of the processor, for one call
@@ -125,6 +127,47 @@ def test_every_public_function_is_called() -> None:
     called = {name.split(" ")[0].split(".")[0] for name in CALLS}
     public = {n for n in sb.__all__ if callable(getattr(sb, n)) and not _is_error(getattr(sb, n))}
     assert public - called - without == set()
+
+
+RESULTS = {  # which functions make, and users do not
+    "mesh": {"Places", "SolidPlaces"},
+    "textile": {
+        *("BendingLoop", "BendingYield", "BiasExtension", "Cantilever", "Curve", "Cycle", "Drape", "DrapeState"),
+        *("FabricFit", "MeanCurve", "Outline", "PictureFrame", "PullForecast", "Reading", "Shear", "ShearLoop"),
+        *("ShearYield", "TensileLoop", "Uniaxial", "WholeFabric"),
+    },
+    "gripped": {"Evaluation", "GrippedMotion", "Rung", "RopeFit", "RopeModel", "RopeReport", "Screened", "Step"},
+    "torch": {"Equilibrium", "State"},
+    "jax": set(),
+    "config": {"Config", "GrippedConfig", "GrippedRopeSection", "Study"},
+    "plot": {"Field", "Motion"},  # plain data, which `fields` and `motions` check
+}
+LARGE = {  # what takes results of long fits or motions between grips: its first argument alone is replaced
+    "gripped": {"evaluate", "fit_rope", "screened"},
+    "plot": {"along", "forces", "over_time"},
+}
+
+
+@pytest.mark.parametrize("module", RESULTS)
+def test_every_public_function_of_a_module_is_called(module: str) -> None:
+    """A new one gets a call in `wrong_calls_more.py`, or a reason here to have none."""
+    try:
+        found = importlib.import_module(f"sheetbend.{module}")
+    except MissingExtraError:
+        pytest.skip(f"{module} needs what is not installed")
+    called = {name.split(" ")[0].split(".")[1] for name in CALLS if name.startswith(f"{module}.")}
+    public = {n for n in found.__all__ if callable(getattr(found, n)) and not _is_error(getattr(found, n))}
+    assert public - called - RESULTS[module] - LARGE.get(module, set()) == set()
+
+
+@pytest.mark.parametrize(("module", "name"), [(module, name) for module in LARGE for name in sorted(LARGE[module])])
+def test_a_wrong_first_argument_is_refused(module: str, name: str) -> None:
+    call = getattr(importlib.import_module(f"sheetbend.{module}"), name)
+    more = {"evaluate": ([],), "screened": (0.1,)}.get(name, ())
+    for label, wrong in WRONG.items():
+        if not (name == "screened" and label in ("empty text", "empty list", "empty mapping")):  # nothing to screen
+            with pytest.raises(sb.SheetbendError):
+                call(wrong, *more)
 
 
 def test_infinity_in_single_precision_is_no_number() -> None:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import sheetbend as sb
 from wrong_calls_beside import BESIDE
+from wrong_calls_more import MORE
 
 Call = tuple[Callable[..., Any], dict[str, Any]]
 TIMES = [0.0, 0.01, 0.02]
@@ -880,4 +881,4 @@ FITS: dict[str, Callable[[], Call]] = {
     ),
 }
 
-CALLS = {**SCENE, **OBJECTS, **RECORDINGS, **MOTION, **FITS, **BESIDE}
+CALLS = {**SCENE, **OBJECTS, **RECORDINGS, **MOTION, **FITS, **BESIDE, **MORE}

@@ -115,6 +115,16 @@ def check_kind(field: str, value: object, kind: type, fix: str, error: type[Inpu
         raise error(field, f"must be {article} {kind.__name__}", value, fix)
 
 
+def check_each(field: str, values: object, kind: type, fix: str, error: type[InputError] = InputError) -> None:
+    """Refuse what is no list of at least one of a class.
+
+    Raises:
+        InputError: of the class `error`.
+    """
+    if not is_list(values) or not len(values) or not all(isinstance(one, kind) for one in values):  # type: ignore
+        raise error(field, f"must hold at least one {kind.__name__}, and nothing else", values, fix)
+
+
 def given_by_name(field: str, given: Mapping[str, Any] | None) -> dict[str, Any]:
     """What was given by name; nothing for None.
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..arrays.checks import check_count, check_kind
 from ..errors import ConfigError
 from ..experiment.experiment import Experiment
 from ..experiment.wanted import as_parameters
@@ -38,6 +39,8 @@ from .shown import ropes_shown, with_grids, with_own_markers, without
 from .solver_schema import solver_for
 from .start_values import check_names, fields_of_parameter, set_start_values
 from .tools import tools_of
+
+MOST_FINER = 64  # times as many segments and cells
 
 
 @dataclass(frozen=True)
@@ -98,7 +101,7 @@ def smooth_fields(config: schema.Config) -> dict[str, Smooth]:
     return {name: Smooth(section.size, section.length) for name, section in config.smooth.items()}
 
 
-def build(config: schema.Config, folder: Path, finer: int = 1) -> Study:
+def build(config: schema.Config, folder: str | Path, finer: int = 1) -> Study:
     """Read the recordings and build one scene for each.
 
     Args:
@@ -108,6 +111,7 @@ def build(config: schema.Config, folder: Path, finer: int = 1) -> Study:
     Raises:
         ConfigError: anything that cannot be built, with the path of its key.
     """
+    folder = _checked(config, folder, finer)
     check_solver(config.scene, config.solver)
     experiments = tuple(_experiment(config, folder, i, finer) for i in range(len(config.recording)))
     names = [e.name for e in experiments]
@@ -128,8 +132,9 @@ def build(config: schema.Config, folder: Path, finer: int = 1) -> Study:
     return study
 
 
-def scene_alone(config: schema.Config, folder: Path = Path(), finer: int = 1) -> tuple[Scene, Solver]:
+def scene_alone(config: schema.Config, folder: str | Path = Path(), finer: int = 1) -> tuple[Scene, Solver]:
     """The scene of a configuration without recordings, and its solver; `folder` and `finer` as in `build`."""
+    folder = _checked(config, folder, finer)
     check_solver(config.scene, config.solver)
     tools = tools_of(config.scene, {}, None, 0.0, folder, "")
     scene, _ = build_scene(config.experiment.name, config.scene, None, {}, finer, folder=folder, tools=tools)
@@ -139,6 +144,15 @@ def scene_alone(config: schema.Config, folder: Path = Path(), finer: int = 1) ->
         assert scene.compiled
     solver.core(scene.compiled)  # raise or warn here, before any work starts
     return scene, solver
+
+
+def _checked(config: schema.Config, folder: str | Path, finer: int) -> Path:
+    """The folder of a configuration whose arguments are of their kinds."""
+    check_kind("config", config, schema.Config, "give what `parse` returns", ConfigError)
+    if not isinstance(folder, str | Path):
+        raise ConfigError("folder", "must be a path", folder, "give the folder of its files")
+    check_count("finer", finer, 1, MOST_FINER, ConfigError)
+    return Path(folder)
 
 
 def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Experiment:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays.checks import check_kind
 from ..recording.recording import Recording
 from ..report.scores import Scores, scores
 from .model import NAME
@@ -42,6 +43,7 @@ def evaluate(found: RopeFit, recordings: Sequence[Recording | GrippedMotion]) ->
     a rope that yields, come from the first `smoothing` s of the model (`fit_rope`). The notes name recordings in which
     the rope slips in a grip, which no prediction knows.
     """
+    check_kind("found", found, RopeFit, "give what fit_rope returns")
     usable = screened(recordings, found.model.smoothing)
     reach = found.values[f"{NAME}_length"]
     kept, predicted, diverged = [], [], []

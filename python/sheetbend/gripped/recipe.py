@@ -16,7 +16,7 @@ from typing import Literal
 
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import is_number
+from ..arrays.checks import is_number, is_several
 from ..errors import InputError
 from ..fitting.fit import Fit
 from ..minimum.journal import journaled
@@ -196,8 +196,8 @@ def _check(
     if marker_mass and density is None:
         fix = "weigh the rope too and give its density, or leave it out"
         raise InputError("marker_mass", "needs the rope's density", marker_mass, fix)
-    if not recordings:
-        raise InputError("recordings", "are empty", 0, "give at least one")
+    if not is_several(recordings) or not any(True for _ in recordings):
+        raise InputError("recordings", "must be at least one", recordings, "give a list of recordings")
     if starts is not None:
         check_count(starts)
     if not (is_number(validate) and 0 <= validate < 1):

@@ -17,6 +17,7 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays.checks import is_several
 from ..errors import InputError, RecordingError
 from ..recording.recording import Recording
 from .alike import FEWEST, alike
@@ -70,6 +71,8 @@ def screened(recordings: Sequence[Recording | GrippedMotion], smoothing: float, 
     """
     if isinstance(recordings, Screened):
         return recordings
+    if not is_several(recordings):
+        raise InputError("recordings", "must be a list", recordings, "give what sb.read_recordings returns")
     for i, recording in enumerate(recordings):
         if not isinstance(recording, Recording | GrippedMotion):
             fix = "give what sb.read_recordings returns"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from ..arrays.checks import check_kind
 from ..quantities.wording import short
 from ..report.fit_result import FitResult
 from ..result.estimate import Estimate
@@ -47,7 +48,11 @@ def trades(result: FitResult) -> tuple[tuple[str, str], ...]:
 
     Args:
         result: of the last fit of `fit_rope`.
+
+    Raises:
+        InputError: it is no result.
     """
+    check_kind("result", result, FitResult, "give the result of the last fit")
     values = {name.removeprefix(f"{NAME}_"): value for name, value in as_quantities(result.values).items()}
     seen = {frozenset((quantity(c.first), quantity(c.second))): c.value for c in result.correlations}
     notes = []

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -21,6 +24,7 @@ from .solid_mesh import SolidMesh
 FORMATS = {".msh": "gmsh", ".vtk": "vtk", ".vtu": "vtu", ".inp": "abaqus", ".mesh": "medit"}
 """By suffix, what meshio calls the format."""
 KINDS = {"hexahedron": 8, "tetra": 4}
+_SHOWN = re.compile(rb"\bnp\.float(?:32|64)\(([-+.\w]+)\)")
 
 
 def read_solid(path: str | Path, unit: str = "m") -> SolidMesh:
@@ -40,7 +44,7 @@ def read_solid(path: str | Path, unit: str = "m") -> SolidMesh:
         MeshError: the file is missing or not readable, it has both kinds or none, or its elements are no solid.
         MissingExtraError: meshio is not installed.
     """
-    if unit not in METERS:
+    if not isinstance(unit, str) or unit not in METERS:
         raise MeshError("unit", "is unknown", unit, f"use one of {', '.join(METERS)}")
     with reading(path, MeshError):
         return _mesh(Path(path), METERS[unit])
@@ -89,6 +93,21 @@ def _named(content: Any) -> dict[str, Any]:
     return found
 
 
+@contextlib.contextmanager
+def _in_numbers(path: Path) -> Iterator[Path]:
+    """The file, or a copy of it where values of a text file of Gmsh are written as NumPy shows them, "np.float64(1.0)"
+    for 1.0, which meshio writes (with NumPy 2) and does not read."""
+    content = path.read_bytes() if path.suffix.lower() == ".msh" else b""
+    numbers = _SHOWN.sub(rb"\1", content)
+    if numbers == content:
+        yield path
+        return
+    with TemporaryDirectory() as folder:
+        copy = Path(folder) / path.name
+        copy.write_bytes(numbers)
+        yield copy
+
+
 def _load(path: Path) -> Any:
     meshio = require("meshio", "mesh")
     note(path)
@@ -96,7 +115,8 @@ def _load(path: Path) -> Any:
     try:
         with warnings.catch_warnings(), contextlib.redirect_stdout(quiet), contextlib.redirect_stderr(quiet):
             warnings.simplefilter("ignore")
-            return meshio.read(path, file_format=FORMATS[path.suffix.lower()])
+            with _in_numbers(path) as file:
+                return meshio.read(file, file_format=FORMATS[path.suffix.lower()])
     except (Exception, SystemExit) as problem:  # whatever a damaged file makes the library raise
         raise MeshError(
             str(path), f"cannot be read ({problem})", type(problem).__name__, "export it again"

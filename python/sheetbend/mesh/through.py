@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays.checks import finite
+from ..arrays.checks import finite, numbers
 from ..errors import MeshError
 
 Array = NDArray[np.float64]
@@ -22,7 +22,7 @@ def through(vertices: Array, at: Array, positions: ArrayLike) -> Array:
     Raises:
         MeshError: positions of another shape, points that coincide, or fewer than three off a line.
     """
-    to = np.asarray(positions, dtype=float)
+    to = numbers("positions", positions, MeshError)
     if to.shape != at.shape:
         raise MeshError("positions", "do not match the places", to.shape, f"give {at.shape}")
     seen = ~np.isnan(to).any(axis=1)

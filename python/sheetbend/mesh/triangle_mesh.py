@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays.checks import check_kind, finite
+from ..arrays.checks import check_kind, finite, whole
 from ..errors import MeshError
 from . import bending_ratio, doubts, places, topology, validate
 from .places import Places
@@ -146,7 +146,8 @@ class TriangleMesh:
 
     def with_set(self, name: str, vertices: ArrayLike) -> TriangleMesh:
         """The same mesh with one more named set (or another one of that name)."""
-        return replace(self, sets={**self.sets, name: np.asarray(vertices)})
+        check_kind("name", name, str, "name the set", MeshError)
+        return replace(self, sets={**self.sets, name: whole(vertices)})
 
     def at(self, points: ArrayLike) -> Places:
         """Places at (k, 2) material coordinates, m.
@@ -175,6 +176,7 @@ class TriangleMesh:
         Raises:
             MeshError: positions of another shape, places that coincide, or fewer than three off a line.
         """
+        check_kind("places", places, Places, "give what `at` returns", MeshError)
         return through(self.vertices, places.positions(self.vertices), positions)
 
     @cached_property

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays.checks import finite, whole
+from ..arrays.checks import finite, numbers, whole
 from ..errors import MeshError
 from . import topology
 from .topology import Indices
@@ -32,7 +32,7 @@ def vertices_within(vertices: Array, lower: ArrayLike, upper: ArrayLike) -> Indi
     Raises:
         MeshError: a corner that is not three numbers.
     """
-    low, high = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
+    low, high = numbers("lower", lower, MeshError), numbers("upper", upper, MeshError)
     for name, bound in (("lower", low), ("upper", high)):
         if bound.shape != (3,) or np.isnan(bound).any():
             raise MeshError(name, "must be three numbers", bound.tolist(), "give x, y and z in m, or infinity")

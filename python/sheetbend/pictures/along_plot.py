@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..arrays.checks import check_kind
 from ..result.field import FieldFit
 from .drawing import FOUND, GRAY, band, clean, key, panels_in
 
@@ -27,6 +28,7 @@ def plot_along(found: FieldFit, *, title: str = "", ax: Axes | None = None) -> A
     Raises:
         MissingExtraError: matplotlib is not installed.
     """
+    check_kind("found", found, FieldFit, "give one of a result's fields")
     panels, whole = panels_in(ax, 1 if ax is not None else 2, (7.2, 4.4), title or found.name)
     s, E, half = np.array(found.centers)[:, 0], np.array(found.stiffness), np.array(found.half_widths)
     clean(panels[0])

@@ -113,13 +113,20 @@ def panels_in(
     if ax is None:
         figure = new_figure(*size, title)
         return list(figure.subplots(**{"nrows": count, "squeeze": False, **grid}).ravel()), figure
-    panels = list(np.ravel(np.array(ax, dtype=object)))
+    panels = all_of(ax)
     if len(panels) != count or not all(hasattr(one, "add_artist") for one in panels):
         got = [type(one).__name__ for one in panels]
         raise InputError("ax", f"must be axes, {count} of them", got, "leave it out for a new figure")
     if title.strip():
         panels[0].set_title(title, fontsize=11, color=INK, loc="left", weight="bold")
     return panels, panels[0]
+
+
+def all_of(drawn: Any) -> list[Any]:
+    """Axes or a figure, alone or in lists and arrays, as one list."""
+    if isinstance(drawn, np.ndarray):
+        return list(drawn.ravel())
+    return [one for each in drawn for one in all_of(each)] if isinstance(drawn, list | tuple) else [drawn]
 
 
 def seen_points(points: np.ndarray) -> np.ndarray:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..arrays.checks import check_each, given_by_name
 from ..arrays.timeseries import Array
-from ..errors import InputError
 from ..optional import require
 from ..quantities.wording import raised
 from ..result.estimate import Estimate
@@ -39,9 +39,8 @@ def plot_estimates(
     Raises:
         InputError: no estimate, or another number of axes than of units.
     """
-    if not estimates:
-        raise InputError("estimates", "are empty", [], "give at least one estimate")
-    published = published or {}
+    check_each("estimates", estimates, Estimate, "give those of a fit's result")
+    published = given_by_name("published", published)
     groups: dict[str, list[Estimate]] = {}
     for estimate in estimates:
         groups.setdefault(estimate.unit, []).append(estimate)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import finite
+from ..arrays.checks import check_each, check_kind, finite
 from ..errors import InputError
 from ..mesh import Places, TriangleMesh
 from ..optional import require
@@ -69,8 +69,8 @@ def plot_fields(
     Raises:
         InputError: no field, values that are neither one per triangle nor one per place, or another number of axes.
     """
-    if not fields:
-        raise InputError("fields", "are empty", 0, "give at least one")
+    check_kind("mesh", mesh, TriangleMesh, "give the mesh of the cloth")
+    check_each("fields", fields, Field, "give sb.plot.Field(...)")
     values = [_checked(f"fields[{k}].values", mesh, field) for k, field in enumerate(fields)]
     panels, whole = _panels(fields, title, ax)
     first_flat = next((k for k, field in enumerate(fields) if field.positions is None), -1)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..arrays.checks import check_kind
 from ..doubts.force_comparison import UNITS, ForceComparison
 from .drawing import ACCENT, GRAY, INK, PALE, WARM, clean, key, panels_in, strip
 
@@ -34,6 +35,7 @@ def plot_forces(
         InputError: another number of axes than of components.
         MissingExtraError: matplotlib is not installed.
     """
+    check_kind("compared", compared, ForceComparison, "give one of a comparison's forces")
     shown = [
         (f"{'force' if unit == 'N' else 'torque'} {AXES[k % 3]} [{unit}]", k)
         for unit, part in UNITS

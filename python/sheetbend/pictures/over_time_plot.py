@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..arrays.checks import check_kind
 from ..result.over_time import OverTimeFit
 from .drawing import FOUND, GRAY, band, clean, key, panels_in
 
@@ -33,6 +34,7 @@ def plot_over_time(
         InputError: another number of axes than three.
         MissingExtraError: matplotlib is not installed.
     """
+    check_kind("found", found, OverTimeFit, "give one of a result's over_time")
     panels, whole = panels_in(ax, 3, (7.2, 5.6), title or f"{found.recording}: {found.name}")
     values, half = np.array(found.values), np.array(found.half_widths)
     for k, panel in enumerate(panels):

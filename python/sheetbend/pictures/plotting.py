@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import is_list, numbers, some_indices
+from ..arrays.checks import check_each, check_kind, is_list, numbers, some_indices
 from ..arrays.timeseries import Array
 from ..doubts.prediction import Comparison
 from ..errors import InputError
 from ..files.whole import written
-from .drawing import ACCENT, GRAY, INK, PALE, WARM, as_strip, clean, key, panels_in, seen_points, strip
+from .drawing import ACCENT, GRAY, INK, PALE, WARM, all_of, as_strip, clean, key, panels_in, seen_points, strip
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,16 +32,30 @@ _AXES = "xyz"
 
 def save(drawn: Figure | Axes | Array, path: str | Path) -> None:
     """Write a figure, or the figure of some axes, whole or not at all; the format follows from the name (png, svg,
-    pdf)."""
-    first: Any = np.ravel(np.array(drawn, dtype=object))[0]
+    pdf).
+
+    Raises:
+        InputError: nothing drawn, or a name whose ending is no format of figures.
+    """
+    first: Any = next(iter(all_of(drawn)), None)
+    if not hasattr(first, "figure"):
+        raise InputError("drawn", "must be a figure, or axes", drawn, "give what a function of sb.plot returns")
     figure = first.figure.figure  # of axes in a part of a figure the whole one
     with written(path) as beside:
+        ending, formats = Path(path).suffix[1:].lower(), figure.canvas.get_supported_filetypes()
+        if ending not in formats:
+            raise InputError("path", "has an ending that is no format", str(path), f"use one of {', '.join(formats)}")
         figure.savefig(beside, dpi=160, facecolor="white")
 
 
 def compared(c: Comparison) -> dict[str, Any]:
     """What `plot_trajectories` and `plot_residuals` take of a motion that a fit compared:
-    `plot_trajectories(**compared(fit.comparisons[0]))`."""
+    `plot_trajectories(**compared(fit.comparisons[0]))`.
+
+    Raises:
+        InputError: it is no comparison.
+    """
+    check_kind("c", c, Comparison, "give one of a fit's comparisons")
     times = c.recording.times
     held_out = times[c.held_out]
     return {
@@ -144,8 +158,7 @@ def plot_motions(
     Raises:
         InputError: no motion, or another number of axes than of motions.
     """
-    if not motions:
-        raise InputError("motions", "are empty", 0, "give at least one")
+    check_each("motions", motions, Motion, "give sb.plot.Motion(...)")
     panels, whole = panels_in(ax, len(motions), (7.2, 0.6 + 2.2 * len(motions)), title or " ")
     for panel, motion in zip(panels, motions, strict=True):
         clean(panel)

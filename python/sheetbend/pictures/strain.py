@@ -55,6 +55,8 @@ def strain_fields(
     Returns:
         (m,) each; the energy is NaN on triangles that are held by all corners.
     """
+    check_kind("scene", scene, Scene, "give the scene of the cloth")
+    check_kind("cloth", cloth, Cloth, "give one of its cloths")
     given = finite("positions", positions, None, SceneError)
     if given.shape not in ((scene.particle_count, 3), (scene.node_count, 3)):
         raise SceneError("positions", "has the wrong shape", given.shape, f"give {(scene.particle_count, 3)}")

@@ -9,7 +9,7 @@ from typing import TypedDict
 
 import numpy as np
 
-from ..arrays.checks import is_number
+from ..arrays.checks import check_count, check_kind, check_positive, is_list, is_number
 from ..errors import InputError, MeshError, NoEquilibriumError
 from ..mesh import TriangleMesh, disk
 from ..motion.equilibrium import Equilibrium, equilibrium
@@ -22,6 +22,7 @@ from .reading import Reading, combined
 from .shadow import Shadow, shadow
 
 _THICK, _RIM = 0.02, 1e-3  # m, of a plate that the cloth touches, and of its rounded edge
+MOST_FOLDS = 1000
 _SAME = 1e-6  # relative difference in energy below which two states are one, turned or mirrored
 
 
@@ -102,6 +103,10 @@ def drape(
     """
     check_specimen("drape", fabric, {"diameter": diameter, "plate": plate}, rings)
     _check_plates(friction, cover)
+    if not is_list(folds):
+        raise InputError("drape.folds", "must be a list", folds, "give numbers of folds, such as (4, 5, 6, 7)")
+    for count in folds:
+        check_count("drape.folds", count, 1, MOST_FOLDS)
     states: list[DrapeState] = []
     lost = []
     for count in folds:
@@ -183,7 +188,13 @@ def _mesh(radius: float, plate: float, rings: int) -> TriangleMesh:
 
 
 def drape_state(rest: Equilibrium, plate: float = 0.18) -> DrapeState:
-    """What a laboratory reads off a state of rest of `drape_scene`."""
+    """What a laboratory reads off a state of rest of `drape_scene`.
+
+    Raises:
+        InputError: no state of rest, or a plate that is none.
+    """
+    check_kind("rest", rest, Equilibrium, "give sb.equilibrium(drape_scene(fabric))")
+    check_positive("drape_state", {"plate": plate}, {})
     cloth = rest.scene.cloths["cloth"]
     flat = _shadow(cloth.mesh, cloth.mesh.vertices)
     seen = _shadow(cloth.mesh, rest.positions[cloth.particles])

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..arrays.checks import check_each, check_kind, given_by_name, is_list, is_number
 from ..arrays.timeseries import Array
 from ..errors import InputError, NoEquilibriumError
 from ..minimum.linear_algebra import one_blas_thread
@@ -77,9 +78,14 @@ class Measured:
         return cls(name=name, test=test, value=float(values.mean()), sigma=sigma, specimens=specimens, note=note)
 
     def __post_init__(self) -> None:
-        if not math.isfinite(self.value):
+        if not isinstance(self.name, str):
+            raise InputError("name", "must be a text", self.name, "name the test")
+        if not callable(self.test):
+            raise InputError(f"{self.name}.test", "must be a function of a fabric", self.test, "give such as shear")
+        given_by_name(f"{self.name}.specimens", self.specimens)
+        if not is_number(self.value):
             raise InputError(f"{self.name}.value", "must be finite", self.value, "give the laboratory's number")
-        if not (math.isfinite(self.sigma) and self.sigma > 0):
+        if not (is_number(self.sigma) and self.sigma > 0):
             raise InputError(
                 f"{self.name}.sigma", "must be a positive size", self.sigma, "give the reading's own error"
             )
@@ -165,8 +171,8 @@ def fit_fabric(measured: Sequence[Measured], start: Fabric, free: Sequence[str])
         NoEquilibriumError: a test of `start` comes to no rest.
         MissingExtraError: scipy is not installed.
     """
-    if not measured:
-        raise InputError("measured", "is empty", len(measured), "give what the laboratory has read")
+    check_each("measured", measured, Measured, "give what the laboratory has read")
+    check_kind("start", start, Fabric, "give a Fabric to begin with")
     parameters = _parameters(start, free)
     evaluate = _Evaluation(measured, start, parameters)
     u = parameters.initial()
@@ -181,7 +187,9 @@ def fit_fabric(measured: Sequence[Measured], start: Fabric, free: Sequence[str])
 
 def _parameters(start: Fabric, free: Sequence[str]) -> Parameters:
     initial = {name: getattr(start, name) for name in _UNITS} | {n: v for n, v, can in start.law.coefficients() if can}
-    unknown = [name for name in free if name not in initial]
+    if not is_list(free):
+        raise InputError("free", "must be a list", free, f"use names of: {', '.join(initial)}")
+    unknown = [name for name in free if not isinstance(name, str) or name not in initial]
     if unknown or not free:
         problem = "name no number of the fabric" if unknown else "is empty"
         raise InputError("free", problem, unknown or list(free), f"use names of: {', '.join(initial)}")

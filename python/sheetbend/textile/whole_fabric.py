@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays.checks import check_each, check_kind, is_number
 from ..errors import InputError
 from ..minimum.linear_algebra import one_blas_thread
 from ..objects.fabric import Fabric
@@ -47,6 +48,17 @@ class FabricTests:
     way: str = "loading"
     cycle: int = 0
 
+    def __post_init__(self) -> None:
+        for field in ("pulls", "readings", "given"):
+            check_kind(field, getattr(self, field), Mapping, "give a mapping, which may be empty")
+        for along, curves in self.pulls.items():
+            check_each(f"pulls.{along}", curves, Curve, "give what textile.read_curves returns")
+        for kind, readings in self.readings.items():
+            check_each(f"readings.{kind}", readings, Measured, "give textile.Measured(...)")
+        for name, value in self.given.items():
+            if not is_number(value):
+                raise InputError(f"given.{name}", "must be a number", value, "give it in SI units")
+
 
 @dataclass(frozen=True)
 class WholeFabric:
@@ -72,6 +84,7 @@ def fit_tests(tests: FabricTests) -> WholeFabric:
         NoEquilibriumError: a test of the first guess comes to no rest.
         MissingExtraError: scipy is not installed.
     """
+    check_kind("tests", tests, FabricTests, "give textile.FabricTests(...)")
     _expect_known(tests)
     law, why = supported_law(tests)
     measured = [m for along, c in tests.pulls.items() for m in pulled(c, along, tests.way, cycle=tests.cycle)]

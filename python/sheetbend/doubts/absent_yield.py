@@ -1,0 +1,110 @@
+"""Internal friction in elements that a model takes as elastic.
+
+Fibers of a rope or a fabric slide on each other, and yarns where they cross (`core/constraints/yielding.h`). Below its
+yield such friction is a stiffness, and far beyond it a constant moment, so that it has no derivative at zero. A fit
+without it takes it for damping and for a lower stiffness. So half of the stiffness is given to a spring that slides
+beyond some parts of how far the fitted motion deforms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays.timeseries import Array
+from ..errors import SheetbendError
+from ..experiment.experiment import Experiment
+from ..minimum.problem import FitProblem
+from ..motion.simulate import simulate
+from ..motion.values import constraint_values
+from ..quantities.kinds import KINDS
+from ..quantities.parameters import Parameter
+from ..quantities.quantities import Quantity, Term
+from ..scene.scene import Scene
+from .more_parameters import with_parameter
+
+YIELDING = {
+    "sheet_curvature": ("yielding_sheet_curvature", slice(0, 3)),
+    "strain": ("yielding_strain", slice(2, 3)),
+    "material_curvature": ("yielding_curvature", slice(0, 2)),
+    "section_curvature": ("section_yielding_curvature", slice(0, 2)),
+}  # by elastic kind, the one that yields, and which of its rows slide
+HALF = 0.5
+SHARE = Parameter(name="sliding_share", initial=HALF, lower=0.0, upper=0.95, scale=0.1)  # of the stiffness
+AT = Parameter(name="sliding_at", initial=1.0, log=True)  # the deformation beyond which it slides
+PARTS = (0.3, 1.0, 2.0)  # of the root mean square of what slides, over the fitted motion
+FRAMES = 9  # of the motion, at which this is asked
+
+
+def elastic_names(motions: Sequence[Experiment]) -> list[str]:
+    """Names of the groups that could yield and do not."""
+    groups = [g for e in motions for g in e.scene.groups]
+    return list(dict.fromkeys(g.name for g in groups if g.kind in YIELDING))
+
+
+def deformed(problem: FitProblem, u: Array, name: str) -> float:
+    """Root mean square, over the motions at u (free,), of what would slide in the elements of a group."""
+    squares = list[float]()
+    for i, recording in enumerate(problem.recordings):
+        e = problem.experiment_at(i, u)
+        rows = next((YIELDING[g.kind][1] for g in e.scene.groups if g.name == name and g.kind in YIELDING), None)
+        if e.static or rows is None:
+            continue
+        solver, values = replace(e.solver, extrapolate=1), problem.values_of(e, u)
+        times = np.maximum(e.scene_times(recording.times, values), 0.0)
+        some = times[np.linspace(0, len(times) - 1, FRAMES).astype(int)[1:]]
+        with suppress(SheetbendError):
+            for x in simulate(e.scene, np.unique(np.rint(some / solver.h)) * solver.h, solver, values).nodes:
+                C = constraint_values(e.scene, x, values)[name][:, rows]
+                squares.append(float((C**2).sum(axis=1).mean()))
+    return float(np.sqrt(np.mean(squares))) if squares else 0.0
+
+
+def with_yield(problem: FitProblem, name: str, at: float) -> FitProblem:
+    """The problem whose elements of a group slide in all of its motions, beyond a deformation of `at`."""
+    return problem.of([e if e.static else replace(e, scene=_sliding(e.scene, name, at)) for e in problem.experiments])
+
+
+def with_free_yield(problem: FitProblem, name: str, at: float) -> FitProblem:
+    """The same problem with two more parameters at the end, `SHARE` and `AT`."""
+    return with_parameter(with_parameter(with_yield(problem, name, at), SHARE), replace(AT, initial=at))
+
+
+def _sliding(scene: Scene, name: str, at: float) -> Scene:
+    places = [k for k, g in enumerate(scene.groups) if g.name == name and g.kind in YIELDING]
+    if not places:
+        return scene
+    (k,) = places
+    g, made = scene.groups[k], scene.shallow()
+    kind, count = YIELDING[g.kind][0], len(g.particles)
+    made._hidden = scene._hidden.moved(*np.zeros((2, scene.hidden_count, 3)))
+    made._hidden.extend(np.zeros((count, 3)), np.zeros((count, 3)), np.ones(count))
+    sets = np.arange(-1 - scene.hidden_count, -1 - made.hidden_count, -1)
+    made.pinned = scene.pinned | set(sets.tolist())
+    place = list(KINDS[kind]["parameters"]).index("share")
+    rest = np.insert(g.rest, [place, place], 0.0, axis=1)
+    made.groups = list(scene.groups)
+    made.groups[k] = replace(g, kind=kind, particles=np.column_stack([g.particles, sets]), rest=rest)
+    first = sum(other.rest.size for other in scene.groups[:k])
+    own = first + np.arange(rest.size).reshape(rest.shape)
+    kept = np.delete(own, [place, place + 1], axis=1)
+    behind = first + rest.size + np.arange(sum(other.rest.size for other in scene.groups[k + 1 :]))
+    moved = np.concatenate([np.arange(first), kept.ravel(), behind])
+    made.quantities = {
+        **scene.quantities,
+        SHARE.name: Quantity(SHARE.name, HALF, "", positive=False, scale=SHARE.scale),
+        AT.name: Quantity(AT.name, at, ""),
+    }
+    made.terms = [
+        *(_moved(term, moved) if term.array == "rest" else term for term in scene.terms),
+        *(Term("rest", own[:, place + n], 1.0, ((p.name, "identity"),)) for n, p in enumerate((SHARE, AT))),
+    ]
+    return made
+
+
+def _moved(term: Term, places: Array) -> Term:
+    index = places[np.asarray(term.index)]
+    return replace(term, index=index if np.ndim(index) else int(index))
