@@ -79,6 +79,25 @@ def blocks(language: str) -> list[object]:
     ]
 
 
+EXTRAS = {
+    r"^(?:from|import) sheetbend\.torch": "torch",
+    r"^(?:from|import) sheetbend\.jax": "jax",
+    r"^import sheetbend\.pesto": "pesto",
+    r"^[^#\n]*(?:\bread_mesh\(|\bread_solid\(|^sheetbend .*\.(?:obj|ply|stl)\b)": "mesh",
+    r"^sheetbend .*--mesh usd": "usd",
+    r"^sheetbend .*--dask": "cluster",
+}
+
+
+@pytest.mark.parametrize("page", [t for t in TEXTS if t.parent.name in ("docs", "tutorials") or t.name == "README.md"])
+def test_pages_name_the_extra_that_their_code_needs(page: Path) -> None:
+    """The page on garments did not, and its first command failed in a fresh environment."""
+    text = page.read_text()
+    code = "\n".join(re.findall(r"```(?:python|py|sh)\n(.*?)```", text, re.S))
+    needed = {extra for pattern, extra in EXTRAS.items() if re.search(pattern, code, re.M)}
+    assert {e for e in needed if not re.search(rf"\[(?:\w+,)*{e}(?:,\w+)*\]|`{e}`", text)} == set()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("block", blocks("python"))
 def test_code_in_the_texts_runs(block: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -210,6 +210,9 @@ class TestFit:
         found = last_line(run("fit", config, "--json"))
         assert found["not_counted"] == []
         assert [made["name"] for made in found["refits"]] == ["time step", "finer mesh"]
+        made = tomllib.loads(Path(found["output"], "fitted.toml").read_text())["parameters"]
+        for name, (parameter, moved) in {n: (made[n], found["refits"][1]["moved"][n]) for n in made}.items():
+            assert parameter["finer"] == pytest.approx(parameter["initial"] + moved, rel=1e-12) and moved != 0, name
         rope = found["parameters"]["rope_EI"]
         assert rope["half_width"] > 2 * off["parameters"]["rope_EI"]["half_width"]
         # The recording is of the fit's own mesh: its estimate stays.
@@ -310,6 +313,12 @@ class TestSimulate:
         finer = last_line(run("simulate", config, "--json", "--output", "fine", "--finer"))["simulated"]["swing"]
         off = np.abs(sb.Recording.load("fine/predicted_swing.npz").positions - marker)
         assert finer["particles"] == 13 and 0.0 < off.max() < 0.05  # other links, the same markers
+        fine = sb.Recording.load("fine/predicted_swing.npz").positions
+        edited(config, "[parameters.rope_EI]\n", "[parameters.rope_EI]\nfiner = 1e-3\n")
+        run("simulate", config, "--output", "same")
+        assert np.array_equal(sb.Recording.load("same/predicted_swing.npz").positions, marker)
+        run("simulate", config, "--output", "soft", "--finer")
+        assert np.abs(sb.Recording.load("soft/predicted_swing.npz").positions - fine).max() > 1e-3
 
     def test_equilibrium(self, config: Path) -> None:
         edited(config, "held_out = [0.2, 0.31]", "static = true")

@@ -13,7 +13,7 @@ from rich.console import Console
 
 from ..config import Config, GrippedConfig, Study, build, parse_any
 from ..config.driven_motion import driven_files, save_driven, with_driven
-from ..config.values import with_values, write
+from ..config.values import with_finer, with_values, write
 from ..doubts.implausible import implausible
 from ..errors import ConfigError
 from ..files.door import reading
@@ -21,6 +21,7 @@ from ..files.whole import write_text
 from ..fitting.fit import Fit
 from ..fitting.fit import fit as run_fit
 from ..minimum.cluster import workers as workers_of
+from ..minimum.discretization import FINER_MESH
 from ..minimum.journal import Journal
 from ..minimum.problem import FitProblem
 from ..minimum.workers import working_on
@@ -266,6 +267,9 @@ def _write(found: Fit, study: Study, source: Path, form: str, page: bool, folder
     write_text(folder / TABLE, parameter_table(found.result))
     # a simulation of it runs on the mesh of the fit, where only these values predict what the report says
     on_mesh = with_values(study.config, {**found.values, **found.on_mesh})
+    for refit in found.result.refits:
+        if refit.name == FINER_MESH:
+            on_mesh = with_finer(on_mesh, refit.moved)
     driven = save_driven(found, folder)
     write(with_driven(study, on_mesh, driven, folder), folder / "fitted.toml", study.folder)
     pages = write_fit_page(found, study.config, source, folder) if page else []

@@ -37,7 +37,7 @@ from .scenes import build_scene
 from .sensors import force_sensors
 from .shown import ropes_shown, with_grids, with_own_markers, without
 from .solver_schema import solver_for
-from .start_values import check_names, fields_of_parameter, set_start_values
+from .start_values import at_finer_values, check_names, fields_of_parameter, set_start_values
 from .tools import tools_of
 
 MOST_FINER = 64  # times as many segments and cells
@@ -113,6 +113,7 @@ def build(config: schema.Config, folder: str | Path, finer: int = 1) -> Study:
     """
     folder = _checked(config, folder, finer)
     check_solver(config.scene, config.solver)
+    config = config if finer == 1 else at_finer_values(config)
     experiments = tuple(_experiment(config, folder, i, finer) for i in range(len(config.recording)))
     names = [e.name for e in experiments]
     for i, name in enumerate(names):

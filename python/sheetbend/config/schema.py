@@ -207,6 +207,9 @@ class ParameterSection(Section):
     """What is fitted. One table each: [parameters.NAME], NAME being a quantity of the scene; `info` lists them."""
 
     initial: Finite | None = key(None, "starting value; the scene's when left out")
+    finer: Finite | None = key(
+        None, "value on twice the segments or cells, for `sheetbend simulate --finer`; a fit writes it into fitted.toml"
+    )
     lower: Finite | None = key(None, "lower bound")
     upper: Finite | None = key(None, "upper bound")
     log: bool | None = key(None, "fit the logarithm; by default for quantities that must be positive")

@@ -81,9 +81,18 @@ def _root(config: schema.Config, name: str) -> tuple[str, float]:
     return at, factor
 
 
+def at_finer_values(config: schema.Config) -> schema.Config:
+    """The configuration whose parameters start at their values on the finer mesh, where it has these."""
+    parameters = {
+        name: p if p.finer is None else p.model_copy(update={"initial": p.finer})
+        for name, p in config.parameters.items()
+    }
+    return config.model_copy(update={"parameters": parameters})
+
+
 def fields_of_parameter(section: schema.ParameterSection) -> dict[str, Any]:
     """The fields of `Parameter` that the configuration sets; a private one starts at its own scene's value."""
-    fields = section.model_dump(exclude_unset=True, exclude_none=True)
+    fields = section.model_dump(exclude_unset=True, exclude_none=True, exclude={"finer"})
     if section.private:
         fields.pop("initial", None)
     if "prior" in fields:

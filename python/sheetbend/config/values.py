@@ -46,6 +46,17 @@ def with_values(config: Config, values: Mapping[str, float]) -> Config:
     return config.model_copy(update={"parameters": parameters, "recording": recordings, "fit": fit})
 
 
+def with_finer(config: Config, moved: Mapping[str, float]) -> Config:
+    """The configuration with the values of its parameters on a mesh twice as fine: what a refit there moved them by,
+    added to the values that they start at."""
+    parameters = dict(config.parameters)
+    for name, section in config.parameters.items():
+        if name in moved and section.initial is not None and section.tied_to is None and math.isfinite(moved[name]):
+            finer = _inside(section, section.initial + moved[name])
+            parameters[name] = section.model_copy(update={"finer": finer})
+    return config.model_copy(update={"parameters": parameters})
+
+
 def write(config: Config, path: Path, folder: Path) -> None:
     """Write a configuration as TOML with the keys that were set.
 

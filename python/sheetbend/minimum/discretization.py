@@ -29,7 +29,7 @@ from .progress import Minimum
 from .refuted import refuted, words
 from .time_step import SECOND_ORDER, SWEEPS, TIME_STEP, Settled, combined, settle
 
-MESH = "mesh"
+MESH, FINER_MESH = "mesh", "finer mesh"
 
 
 @dataclass(frozen=True)
@@ -190,7 +190,7 @@ def _refits(
         refits.append((SWEEPS, lambda: [_swept(e) for e in fitted], 2.0))
     if refinement.finer is not None:
         make = refinement.finer
-        refits.append(("finer mesh", lambda: [e for e in make() if e.predict is None], SECOND_ORDER))
+        refits.append((FINER_MESH, lambda: [e for e in make() if e.predict is None], SECOND_ORDER))
     return refits
 
 

@@ -104,17 +104,21 @@ def _steps(result: FitData) -> Iterator[str]:
         yield f'do not use {_names(result, UNSOUND)} before you have read "What contradicts this fit"'
     worse = [r.name for r in result.recordings if r.held_out is not None and r.baseline and r.held_out > r.baseline]
     if worse:
-        yield f"find out why {', '.join(worse[:NAMED])} is predicted worse than without physics: watch the two motions"
+        yield f"look in report.html why {', '.join(worse[:NAMED])} is predicted worse than without physics"
     if _noise_ratio(result) > FAR:
         yield "look at which markers are missed, and when: the model lacks something there, or sigma is too small"
     if verdicts & {*OPEN}:
         yield f'read what "What the data cannot tell" says about {_names(result, OPEN)}'
+    weak = _names(result, ("weak",))
+    narrower = f"if the intervals are too wide for you, record a motion that depends more on {weak}"
+    if weak and "identified" not in verdicts:
+        yield narrower
     found = dependences(result)
     if found:
         name, on = next(iter(found.items()))
         yield f'check that {on.name} is right to {on.size}. If it is not, use "+/- in all" as the half-width of {name}'
-    if "weak" in verdicts:
-        yield f"if the intervals are too wide for you, record a motion that depends more on {_names(result, ('weak',))}"
+    if weak and "identified" in verdicts:
+        yield narrower
     if all(r.held_out is None for r in result.recordings):
         yield "hold out a part of the data (`held_out`), to see how well the model predicts"
     if not (found or verdicts - {"identified"}):
