@@ -80,10 +80,21 @@ void pull_back_resting(const Balance& r) {
   resting_vjp(contacts, r.at.x.data(), away.data(), given.empty() ? r.bar.of(Quantity::position) : given.data(), r.bar);
 }
 
-// Places of nodes that are held, masses, gravity and forces.
+// Of the drag of a node at rest in the wind u, f = (c1 + c2 |u|) u.
+void pull_back_drag(const Balance& r, int n, const Vec3<double>& u, const Vec3<double>& f_bar, Vec3<double>& u_bar) {
+  const double along = dot(f_bar, u), speed = norm(u), quadratic = r.in.of(Quantity::drag_quadratic)[n];
+  r.bar.of(Quantity::drag_linear)[n] += along;
+  r.bar.of(Quantity::drag_quadratic)[n] += speed * along;
+  u_bar = u_bar + (r.in.of(Quantity::drag_linear)[n] + quadratic * speed) * f_bar +
+          (quadratic * along * inverse_or_zero(speed)) * u;
+}
+
+// Places of nodes that are held, masses, gravity, drag in the wind and forces.
 void pull_back_held_and_loads(const Balance& r) {
   const Vec3<double> gravity(r.in.of(Quantity::gravity));
   const KnotWeights boundary = r.scene.driven.empty() ? KnotWeights{} : r.scene.boundary.at(r.at.t0);
+  const Vec3<double> wind = wind_at(r.scene, r.in, r.at.t0);
+  Vec3<double> wind_bar;
   const KnotWeights force = r.scene.loaded.empty() ? KnotWeights{} : r.scene.force.at(r.at.t0);
   for (int n = 0; n < r.scene.nodes(); ++n) {
     const Vec3<double> un(&r.u[r.scene.first_dof[n]]), held(&r.fixed[r.scene.first_dof[n]]);
@@ -96,12 +107,14 @@ void pull_back_held_and_loads(const Balance& r) {
       if (r.scene.has_weight[n]) {
         r.bar.of(Quantity::mass)[n] -= dot(un, gravity);
         (-r.in.of(Quantity::mass)[n] * un).add_to(r.bar.of(Quantity::gravity));
+        if (r.scene.drag_in_wind) pull_back_drag(r, n, wind, -un, wind_bar);
       }
       if (r.scene.loaded_slot[n] >= 0)
         pull_back_knots(force, -un, r.bar.of(Quantity::force), static_cast<int>(r.scene.loaded.size()),
                         r.scene.loaded_slot[n]);
     }
   }
+  if (r.scene.drag_in_wind) pull_back_knots(r.scene.wind.at(r.at.t0), wind_bar, r.bar.of(Quantity::wind), 1, 0);
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
 // The load of a support: what holds the particles of a grip, a clamp or a hook where their motion is given, at the end of a substep.
 //
 //   F = - sum_i J_i^T lambda/eta^2            the constraints' pull on the held particles (core/solver: x' = x + W J^T dl)
-//     + sum_k m_k (a_k - gravity) + c_k v_k - air_k     what the support carries besides: the mass that stands in held particles
+//     + sum_k m_k (a_k - gravity) - drag_k - air_k      what the support carries besides: the mass that stands in held particles
 //
 // with a torque about one of the particles; a held director or axis, which is a direction, takes torque and no force. The multipliers hold elastic
 // and damping forces alike, and those of rigid constraints. Accelerations follow from positions at several substeps (force_sensor.h), so
@@ -96,16 +96,15 @@ class SupportReader {
       for (std::size_t k = 0; k < nodes.size(); ++k)
         if (holds(nodes[k])) hold(nodes[k], (rate * lambda[scene.rows + volume]) * gradient[k]);
     }
+    const Vec3<T> wind = wind_at(scene, in, t);
     for (const int n : support_.carried) {
       const Vec3<T> place = at(x, n), speed = at(v, n), momentum = in.of(Quantity::mass)[n] * speed;
       if (scene.is_place[n]) load.moment = load.moment + in.of(Quantity::mass)[n] * place;
       load.spin = load.spin + cross(place, momentum);
       if (!scene.has_drag) continue;
-      const T c =
-          in.of(Quantity::drag_linear)[n] + in.of(Quantity::drag_quadratic)[n] * sqrt_or_zero(dot(speed, speed));
-      hold(n, c * speed);
+      hold(n, -drag_force(in, n, scene.is_place[n] ? wind - speed : -speed));
     }
-    blown(scene, in, t, at, x, v, hold);
+    blown(scene, in, wind, at, x, v, hold);
     return load;
   }
 
@@ -126,10 +125,8 @@ class SupportReader {
 
   // The air's third of each triangle at the vertices that are carried.
   template <class T, class At, class Hold>
-  void blown(const Scene& scene, const Inputs<const T>& in, double t, At&& at, const T* x, const T* v,
+  void blown(const Scene& scene, const Inputs<const T>& in, const Vec3<T>& wind, At&& at, const T* x, const T* v,
              Hold&& hold) const {
-    if (air_.empty()) return;
-    const Vec3<T> wind = at_knots(scene.wind.at(t), in.of(Quantity::wind), 1, 0);
     for (const auto& [i, node] : air_) {
       const auto& [a, b, c] = scene.air[i];
       const AirTriangle<T> triangle{at(x, b) - at(x, a),

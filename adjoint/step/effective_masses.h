@@ -51,6 +51,7 @@ struct ReverseOf<ComputeEffectiveMasses> {
     const Scene& scene = step.scene;
     const std::vector<T>& w = masses.w;
     const T eta(step.bdf.eta);
+    Vec3<T> wind_bar;
     for (int n = 0; n < scene.nodes(); ++n) {
       if (!scene.inertial[n]) continue;
       const int dof = scene.first_dof[n], slot = scene.loaded_slot[n];
@@ -58,13 +59,16 @@ struct ReverseOf<ComputeEffectiveMasses> {
       T momentum_bar = step.in.of(Quantity::mass)[n] * bar.kept[n];
       if (slot >= 0) momentum_bar += bar.w_of_forces[slot];
       const T m_eff_bar = -(w[n] * w[n] * (bar.w[n] + momentum_bar));
-      const Vec3<T> v = extrapolated(step.bdf, step.from.v + dof, step.from.v_before + dof);
+      Vec3<T> v = extrapolated(step.bdf, step.from.v + dof, step.from.v_before + dof);
+      if (scene.has_weight[n]) v = v - masses.wind;
       const T v2 = dot(v, v), speed = sqrt_or_zero(v2);
       bar.in.of(Quantity::drag_linear)[n] += eta * m_eff_bar;
       bar.in.of(Quantity::drag_quadratic)[n] += eta * speed * m_eff_bar;
       const T along = eta * step.in.of(Quantity::drag_quadratic)[n] * m_eff_bar * inverse_or_zero(speed);
       pull_back_extrapolated(step.bdf, along * v, bar.from.v + dof, bar.from.v_before + dof);
+      if (scene.has_weight[n]) wind_bar = wind_bar - along * v;
     }
+    if (scene.drag_in_wind) pull_back_knots(scene.wind.at(step.t_next), wind_bar, bar.in.of(Quantity::wind), 1, 0);
   }
 };
 

@@ -26,11 +26,11 @@ struct ReverseOf<Predict> {
     free_motion(step, work, scratch, bar);
     weightless_nodes(step, work, bar);
     fixed_nodes(step, bar);
-    if (step.scene.has_drag) kept_momentum(step, bar);
+    if (step.scene.has_drag) kept_momentum(step, work.masses, bar);
   }
 
  private:
-  // q = history(x) + eta v*, v* = m w (history(v) + eta g)
+  // q = history(x) + eta v*, v* = u + m w (history(v) - u + eta g)
   template <class T>
   static void free_motion(const Step<T>& step, const Work<T>& work, Scratch<T>& scratch,
                           const StepCotangents<T>& cotangents) {
@@ -94,19 +94,25 @@ struct ReverseOf<Predict> {
       pull_back_knots(boundary, Vec3<T>(bar.q.of(scene.driven[i])), bar.in.of(Quantity::boundary), slots, i);
   }
 
-  // Of m w, with drag.
+  // Of m w and of the wind u, with drag.
   template <class T>
-  static void kept_momentum(const Step<T>& step, const StepCotangents<T>& bar) {
+  static void kept_momentum(const Step<T>& step, const InverseMasses<T>& masses, const StepCotangents<T>& bar) {
     const Scene& scene = step.scene;
     const T eta(step.bdf.eta);
     const Vec3<T> gravity(step.in.of(Quantity::gravity));
+    Vec3<T> wind_bar;
     for (int n = 0; n < scene.nodes(); ++n) {
       if (!scene.inertial[n]) continue;
       const int dof = scene.first_dof[n];
+      const Vec3<T> v_star_bar = eta * Vec3<T>(bar.q.of(n));
       Vec3<T> free_velocity = history(step.bdf, Exactly<T>{}, step.from.v + dof, step.from.v_before + dof);
-      if (scene.has_weight[n]) free_velocity = free_velocity + eta * gravity;
-      bar.kept[n] = dot(free_velocity, eta * Vec3<T>(bar.q.of(n)));
+      if (scene.has_weight[n]) {
+        free_velocity = free_velocity + (eta * gravity - masses.wind);
+        wind_bar = wind_bar + (T(1.0) - masses.kept[n]) * v_star_bar;
+      }
+      bar.kept[n] = dot(free_velocity, v_star_bar);
     }
+    if (scene.drag_in_wind) pull_back_knots(scene.wind.at(step.t_next), wind_bar, bar.in.of(Quantity::wind), 1, 0);
   }
 };
 

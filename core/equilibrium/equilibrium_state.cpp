@@ -39,7 +39,7 @@ double mean_edge(const Scene& scene, const double* x) {
   return count == 0 ? 0.0 : sum / count;
 }
 
-// The solver works with the Hessian of an energy. The forces of wind have none, those of pressure only in some scenes.
+// The solver works with the Hessian of an energy. The forces of wind on triangles have none, those of pressure only in some scenes.
 void expect_energy(const Scene& scene, const Inputs<const double>& in, double t0) {
   if (scene.air.empty()) return;
   if (const int n = without_energy(scene, in); n >= 0)
@@ -47,7 +47,7 @@ void expect_energy(const Scene& scene, const Inputs<const double>& in, double t0
         "pressure: a state of rest was asked for, but at particle " + std::to_string(n) +
         " the surface under pressure ends or the pressure changes. Fix: close the surface or hold its rim, give one "
         "pressure, or simulate with drag until the motion has died down");
-  const Vec3<double> wind = at_knots(scene.wind.at(t0), in.of(Quantity::wind), 1, 0);
+  const Vec3<double> wind = wind_at(scene, in, t0);
   if (dot(wind, wind) == 0.0) return;
   std::ostringstream text;
   text << "wind: a state of rest was asked for at t = " << t0 << " s, where the wind is " << norm(wind)

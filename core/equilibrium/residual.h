@@ -1,6 +1,6 @@
 // The equations of static equilibrium, over any scalar. Unknowns are the coordinates x of the free nodes and the multipliers lambda:
 //
-//   r_x = f + J(x)^T lambda = 0        f = m gravity + force, at the time t0, + pressure(x)
+//   r_x = f + J(x)^T lambda = 0        f = m gravity + force + drag in the wind, at the time t0, + pressure(x)
 //   r_l = C(x) + alpha lambda = 0      alpha: compliance; 0 is a rigid constraint
 //
 // Multipliers are those of the constraints, then one per kept volume (C = V - V0), which is the pressure inside.
@@ -8,13 +8,14 @@
 // J^T lambda is the force of the constraints on the particles, so a stretched link (C = length - rest > 0) has lambda = -tension.
 // For an elastic constraint lambda = -C/alpha, and the pair is the stationarity of the energy -f.x + C.C/(2 alpha), with -p V for
 // pressure (pressure.h).
-// What contacts add to r_x stands in resting.h. Pinned nodes stay at Quantity::position, driven ones on their boundary at t0; drag, damping and still air do not act at rest.
+// What contacts add to r_x stands in resting.h. Pinned nodes stay at Quantity::position, driven ones on their boundary at t0; damping and still air do not act at rest.
 #pragma once
 
 #include <algorithm>
 
 #include "core/constraints/any_kind.h"
 #include "core/equilibrium/pressure.h"
+#include "core/scene/wind.h"
 #include "core/step/substep.h"
 
 namespace sheetbend {
@@ -63,11 +64,15 @@ void place_fixed(const Scene& scene, const Inputs<const T>& in, double t0, T* x)
 template <class T>
 void dead_load(const Scene& scene, const Inputs<const T>& in, double t0, T* f) {
   const Vec3<T> gravity(in.of(Quantity::gravity));
+  const Vec3<T> wind = wind_at(scene, in, t0);
   const KnotWeights knots = scene.loaded.empty() ? KnotWeights{} : scene.force.at(t0);
   std::fill_n(f, scene.dofs(), T(0.0));
   for (int n = 0; n < scene.nodes(); ++n) {
     if (!scene.inertial[n]) continue;
-    if (scene.has_weight[n]) (in.of(Quantity::mass)[n] * gravity).store(f + scene.first_dof[n]);
+    if (scene.has_weight[n]) {
+      (in.of(Quantity::mass)[n] * gravity).store(f + scene.first_dof[n]);
+      if (scene.drag_in_wind) drag_force(in, n, wind).add_to(f + scene.first_dof[n]);
+    }
     if (scene.loaded_slot[n] >= 0)
       at_knots(knots, in.of(Quantity::force), static_cast<int>(scene.loaded.size()), scene.loaded_slot[n])
           .add_to(f + scene.first_dof[n]);

@@ -13,10 +13,10 @@ struct Frame {
 // Coordinates are (points, 3) but for those being corrected, whose points are `stride` numbers apart. Every number is a scalar of its kind.
 struct Points {
   double eta, now, before, extrapolate_now, extrapolate_before;  // as in Bdf
-  const char *inertial, *director;                               // per point
+  const char *inertial, *director, *has_weight;                  // per point
   const double *x, *x_before, *v, *v_before;                     // at n and n-1
   const double *mass, *drag_linear, *drag_quadratic;
-  const double* gravity;
+  const double *gravity, *wind;
   double *w, *kept;  // effective inverse masses; m w, null without drag
   double* q;
   int stride;

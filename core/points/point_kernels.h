@@ -58,10 +58,12 @@ struct PointKernels {
   }
 
   static void effective_masses(const Points& p, int begin, int end) {
+    const Vec3<S> wind = load_point(p.wind, 0);
     for (long n = begin; n < end; ++n) {
       if (!p.inertial[n]) continue;
       const auto v = [&](int d) { return extrapolated(p, p.v, p.v_before, 3 * n + d); };
-      const Vec3<S> velocity(v(0), v(1), v(2));
+      Vec3<S> velocity(v(0), v(1), v(2));
+      if (p.has_weight[n]) velocity = velocity - wind;
       const S speed = sqrt_or_zero(dot(velocity, velocity)), mass = load(p.mass, n);
       const S effective = mass + p.eta * (load(p.drag_linear, n) + load(p.drag_quadratic, n) * speed);
       const S w = 1.0 / effective;
@@ -71,7 +73,9 @@ struct PointKernels {
   }
 
   static void predict(const Points& p, int begin, int end) {
-    const S gravity[3] = {p.eta * load(p.gravity, 0), p.eta * load(p.gravity, 1), p.eta * load(p.gravity, 2)};
+    const Vec3<S> wind = load_point(p.wind, 0), gravity = p.eta * load_point(p.gravity, 0);
+    const S carried[3] = {wind.x, wind.y, wind.z},
+            added[3] = {gravity.x - wind.x, gravity.y - wind.y, gravity.z - wind.z};
     for (long n = begin; n < end; ++n)
       for (int d = 0; d < 3; ++d) {
         const long i = 3 * n + d;
@@ -79,8 +83,8 @@ struct PointKernels {
           store(p.q, p.stride * n + d, extrapolated(p, p.x, p.x_before, i));
           continue;
         }
-        S v = history(p, p.v, p.v_before, i) + gravity[d];
-        if (p.kept) v = load(p.kept, n) * v;
+        S v = history(p, p.v, p.v_before, i) + added[d];
+        if (p.kept) v = load(p.kept, n) * v + carried[d];
         store(p.q, p.stride * n + d, history(p, p.x, p.x_before, i) + p.eta * v);
       }
   }

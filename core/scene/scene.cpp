@@ -162,7 +162,7 @@ void add_directors(const SceneSpec& spec, Scene& s) {
   }
 }
 
-// What changes over time: driven nodes, forces, and the wind on triangles.
+// What changes over time: driven nodes, forces, and the wind.
 void add_knots(const SceneSpec& spec, Scene& s) {
   for (const int n : spec.loaded)
     if (s.is_director[n] && s.role[n] == Role::free)
@@ -182,6 +182,7 @@ void add_knots(const SceneSpec& spec, Scene& s) {
   s.wind = spec.wind;
   check_triangles("air", s.air, s);
   check_knots("wind_times", s.wind, !s.air.empty());
+  s.drag_in_wind = s.has_drag && !s.wind.times.empty();
 }
 
 // Returns how many values the parameters of all constraints are.

@@ -138,6 +138,7 @@ struct Scene {
   std::vector<int> loaded;       // nodes that time-dependent forces act on
   std::vector<int> loaded_slot;
   bool has_drag = false;
+  bool drag_in_wind = false;            // drag is against the velocity relative to the wind, of what has weight
   std::vector<std::array<int, 3>> air;  // nodes of the triangles that air acts on
   Knots boundary, force, wind, load;
   std::vector<Load> loads;

@@ -185,6 +185,9 @@ double work_of_forces(const Scene& scene, const Moved& s, const Inputs<const dou
     work += longest(in.of(Quantity::force) + 3 * i, scene.force.times.size(), loads) *
             (moved(scene.loaded[i]) + (scene.is_place[scene.loaded[i]] ? size : 1.0));
   const double wind = longest(in.of(Quantity::wind), scene.wind.times.size(), 1);
+  for (int n = 0; n < scene.nodes() && scene.drag_in_wind; ++n)
+    if (scene.has_weight[n])
+      work += (in.of(Quantity::drag_linear)[n] + in.of(Quantity::drag_quadratic)[n] * wind) * wind * (moved(n) + size);
   for (std::size_t i = 0; i < scene.air.size(); ++i) {
     const auto& [a, b, c] = scene.air[i];
     const double* at[2] = {s.start, s.x};

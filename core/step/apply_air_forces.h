@@ -5,6 +5,7 @@
 // a third to each vertex. Which side the normal n points to matters to the pressure p alone: it pushes along (x1 - x0) x (x2 - x0).
 #pragma once
 
+#include "core/scene/wind.h"
 #include "core/step/stages.h"
 
 namespace sheetbend {
@@ -43,13 +44,9 @@ struct AirForce {
 template <class T>
 struct Airflow {
   const Step<T>& step;
-  KnotWeights knots;
   Vec3<T> wind;
 
-  explicit Airflow(const Step<T>& step_)
-      : step(step_),
-        knots(step_.scene.wind.at(step_.t_next)),
-        wind(at_knots(knots, step_.in.of(Quantity::wind), 1, 0)) {}
+  explicit Airflow(const Step<T>& step_) : step(step_), wind(wind_at(step_.scene, step_.in, step_.t_next)) {}
 
   AirTriangle<T> at(int triangle) const {
     const SubstepStates<T>& s = step.from;

@@ -1,11 +1,13 @@
 // The masses that a substep's projections see.
 #pragma once
 
+#include "core/scene/wind.h"
 #include "core/step/stages.h"
 
 namespace sheetbend {
 
-// Drag c = c1 + c2 |v| is implicit: it adds eta c to the mass, so the reaction of the constraints feels it.
+// Drag c = c1 + c2 |v| is implicit: it adds eta c to the mass, so the reaction of the constraints feels it. v is relative to the wind, where
+// there is one.
 struct ComputeEffectiveMasses {
   static constexpr bool repeated = true;
   template <class T>
@@ -28,6 +30,7 @@ struct ComputeEffectiveMasses {
                       : scene.role[n] == Role::free ? T(1.0) / (mass[n] * eta * eta)
                                                     : T(0.0);
     }
+    if (scene.drag_in_wind) masses.wind = wind_at(scene, step.in, step.t_next);
     if (scene.has_drag) point_kernels<T>().effective_masses(points_of(step, masses), 0, scene.nodes());
   }
 };

@@ -1,6 +1,8 @@
 // Where a substep starts: the positions that free motion would give,
 //
-//   x* = history(x) + eta v*,   v* = m w (history(v) + eta gravity),   w = 1/(m + eta c).
+//   x* = history(x) + eta v*,   v* = u + m w (history(v) - u + eta gravity),   w = 1/(m + eta c),
+//
+// where drag c is against a wind u; without drag m w = 1.
 //
 // Axes of bodies have no weight, directors go on as they turned, pinned nodes stay, driven ones go where their boundary is at the substep's end.
 #pragma once
@@ -32,7 +34,9 @@ struct Predict {
   static void free_motion(const Step<double>& step, Work<double>& work) {
     const Scene& scene = step.scene;
     const double eta = step.bdf.eta, *g = step.in.of(Quantity::gravity);
-    const double gravity[4] = {eta * g[0], eta * g[1], eta * g[2], 0.0};
+    const Vec3<double> u = work.masses.wind;
+    const double wind[4] = {u.x, u.y, u.z, 0.0};
+    const double added[4] = {eta * g[0] - u.x, eta * g[1] - u.y, eta * g[2] - u.z, 0.0};
     const double* kept = scene.has_drag ? work.masses.kept.data() : nullptr;
     const int* first_dof = scene.first_dof.data();
     const Coordinates<double> q = work.q;
@@ -41,8 +45,8 @@ struct Predict {
     parallel_for(scene.nodes(), step.threads(), points_per_thread, [=](int begin, int end) {
       for_each_point<double>(begin, end, [=](int n, auto how) {
         const int dof = first_dof[n];
-        auto v = history(bdf, how, s.v + dof, s.v_before + dof) + how.load(gravity);
-        if (kept) v = scaled(kept[n], v);
+        auto v = history(bdf, how, s.v + dof, s.v_before + dof) + how.load(added);
+        if (kept) v = scaled(kept[n], v) + how.load(wind);
         how.store(q.of(n), history(bdf, how, s.x + dof, s.x_before + dof) + scaled(eta, v));
       });
     });
@@ -52,7 +56,7 @@ struct Predict {
     }
   }
 
-  // Again, without gravity.
+  // Again, without gravity and wind.
   template <class T>
   static void weightless_nodes(const Step<T>& step, Work<T>& work) {
     const Scene& scene = step.scene;

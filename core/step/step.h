@@ -32,10 +32,11 @@ struct Step {
 };
 
 // The effective inverse masses: w = 1/(m + eta c), of a director 1/(m eta^2), 0 for what cannot move; and with drag the share m w of its
-// momentum that a particle keeps.
+// momentum that a particle keeps, in a wind of that relative to it.
 template <class T>
 struct InverseMasses {
   std::vector<T> w, kept;
+  Vec3<T> wind;      // at the substep's end; zero where drag is against still air
   double eta = 0.0;  // without drag they are computed once per eta
 
   void resize(const Scene& scene, const Plan&, bool) {
@@ -124,6 +125,7 @@ sheetbend_points::Points points_of(const Step<T>& step, InverseMasses<T>& masses
   p.extrapolate_before = step.bdf.extrapolate_before;
   p.inertial = scene.inertial.data();
   p.director = scene.is_director.data();
+  p.has_weight = scene.has_weight.data();
   p.x = read(step.from.x);
   p.x_before = read(step.from.x_before);
   p.v = read(step.from.v);
@@ -132,6 +134,7 @@ sheetbend_points::Points points_of(const Step<T>& step, InverseMasses<T>& masses
   p.drag_linear = read(step.in.of(Quantity::drag_linear));
   p.drag_quadratic = read(step.in.of(Quantity::drag_quadratic));
   p.gravity = read(step.in.of(Quantity::gravity));
+  p.wind = read(&masses.wind.x);
   p.w = write(masses.w.data());
   p.kept = scene.has_drag ? write(masses.kept.data()) : nullptr;
   if (!work) return p;

@@ -66,6 +66,14 @@ def draft(unknown: bool) -> sb.Scene:
     return scene
 
 
+def gust(unknown: bool) -> sb.Scene:
+    own = {"density": 0.05, "EI": 1e-3, "bend_damping": 0.02, "drag_linear": 0.05, "drag_quadratic": 0.05}
+    scene = sb.rope(0.4, 10, pinned=(), clamp_start=(0.0, 0.0, -1.0), **own)
+    if unknown:
+        sb.add_unknown_wind(scene, scale=1.0, spacing=0.05, duration=1.0)
+    return scene
+
+
 def flag(unknown: bool) -> sb.Scene:
     mesh = sb.mesh.grid(0.3, 0.2, 6, 4, pattern="one_way")
     scene = sb.Scene("flag")
@@ -84,6 +92,9 @@ MOTIONS = {
     ),
     "draft": Motion(
         "a draft along a rope", draft, sb.Solver(h=1 / 600), 61, 60.0, 0.05, 0.1, ("rope_EI", "rope_bend_damping")
+    ),
+    "gust": Motion(
+        "a wind at a hanging rope", gust, sb.Solver(h=1 / 600), 61, 60.0, 1.0, 0.1, ("rope_EI", "rope_bend_damping")
     ),
     "flag": Motion(
         "a wind at a flag", flag, sb.Solver(h=0.005, method="newton"), 31, 50.0, 0.5, 0.1, ("cloth_bending",)

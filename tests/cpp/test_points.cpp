@@ -9,11 +9,12 @@ namespace sheetbend::testing {
 namespace {
 
 constexpr int points = 6;
-// Coordinates at n and n-1, masses and both drags, gravity.
-constexpr int inputs = 4 * 3 * points + 3 * points + 3;
+// Coordinates at n and n-1, masses and both drags, gravity, wind.
+constexpr int inputs = 4 * 3 * points + 3 * points + 6;
 // A director on the edge from point 0 to 1, a normal, and the director about it.
 constexpr sheetbend_points::Frame frames[] = {{9, 0, 3}, {12, -1, 12}, {15, -1, 12}};
 constexpr char inertial[points] = {1, 1, 0, 0, 0, 0}, director[points] = {0, 0, 0, 1, 1, 1};
+constexpr char has_weight[points] = {1, 0, 0, 0, 0, 0};  // of which wind blows on what has drag
 
 template <class T>
 std::vector<T> run(const sheetbend_points::Kernels& kernels, const std::vector<T>& in, bool second_order, int stride) {
@@ -29,6 +30,7 @@ std::vector<T> run(const sheetbend_points::Kernels& kernels, const std::vector<T
   p.extrapolate_before = second_order ? -1.0 : 0.0;
   p.inertial = inertial;
   p.director = director;
+  p.has_weight = has_weight;
   p.x = from(0);
   p.x_before = from(3 * points);
   p.v = from(6 * points);
@@ -37,6 +39,7 @@ std::vector<T> run(const sheetbend_points::Kernels& kernels, const std::vector<T
   p.drag_linear = from(13 * points);
   p.drag_quadratic = from(14 * points);
   p.gravity = from(15 * points);
+  p.wind = from(15 * points + 3);
   p.w = to(0);
   p.kept = to(points);
   p.q = to(2 * points);

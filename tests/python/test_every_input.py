@@ -181,7 +181,7 @@ def _told(problem: FitProblem) -> dict[str, set[int]]:
     theta, slots, _ = problem.known(u)
     own = theta[slots[0]]
     found: dict[str, set[int]] = {}
-    for one in told_inputs(e, own, e):
+    for one in told_inputs(e, own):
         added = one.added if isinstance(one.added, list) else [one.added]
         for each in added:
             array, at, _ = each if isinstance(each, tuple) else ("gravity", np.arange(3), each)

@@ -75,7 +75,7 @@ def test_told_numbers_change_the_motion_that_starts_where_the_fit_found_it() -> 
     u = problem.parameters.initial()
     told, why = told_numbers(problem, u)
     assert not why
-    blown, moves = drafts(problem, u, 0, e.scene.compiled.inputs())
+    blown, moves = drafts(problem, u, 0)
     assert moves and blown.experiments[0].start == "settled"
     assert (blown.experiments[0].scene.positions == problem.experiment_at(0, u).scene.positions).all()
     (size,) = [one.column for one in told if one.label == "size of gravity"]

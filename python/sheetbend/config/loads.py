@@ -52,19 +52,25 @@ def add_forces(scene: Scene, forces: Sequence[Force], find: Callable[[str, str],
 
 
 def add_winds(scene: Scene, section: SceneSection) -> None:
-    """Let air act on the cloths that have a coefficient for it, in the scene's wind (`Scene.add_air`).
+    """Set the scene's wind, and let air act on the cloths that have a coefficient for it (`Scene.add_air`).
 
     Raises:
-        ConfigError: times that do not increase, or as many velocities as do not match them.
+        ConfigError: times that do not increase, as many velocities as do not match them, or a wind that blows on
+            nothing.
     """
-    wind = {} if section.wind is None else {"wind": section.wind.velocity, "times": section.wind.times}
+    if section.wind is not None:
+        with located("scene"):
+            scene.set_wind(section.wind.velocity, section.wind.times)
+        if not scene.has_drag and not any(cloth.in_air for cloth in section.cloth):
+            fix = "give air_normal to a [[scene.cloth]], or drag to what it blows on (drag_linear of a [[scene.rope]])"
+            raise ConfigError("scene.wind", "blows on nothing", section.wind.velocity, fix)
     for described in section.cloth:
         if not described.in_air:
             continue
         cloth = scene.cloths[described.name]
         normal, tangential = described.air_normal or 0.0, described.air_tangential or 0.0
         with located("scene"):
-            scene.add_air(cloth.particles[cloth.mesh.triangles], normal, tangential, name=cloth.name, **wind)
+            scene.add_air(cloth.particles[cloth.mesh.triangles], normal, tangential, name=cloth.name)
 
 
 def add_unknown_inputs(

@@ -27,8 +27,8 @@ def check_rest(path: str, section: SceneSection, scene: Scene) -> None:
 
 
 def _check_still(path: str, section: SceneSection) -> None:
-    if section.wind is None:
-        return
+    if section.wind is None or not any(cloth.in_air for cloth in section.cloth):
+        return  # drag in a wind is a constant force
     velocity = section.wind.velocity
     first = velocity[0] if isinstance(velocity[0], list) else velocity
     if any(first):

@@ -153,7 +153,7 @@ class UnknownForce(Section):
 
 class UnknownWind(Section):
     """[scene.unknown_wind]: a wind over time that nobody measured, added to the constant one, `sb.add_unknown_wind`. It
-    blows on the cloths that have `air_normal` or `air_tangential`. A fit finds it like an unknown force."""
+    blows on what the constant one does. A fit finds it like an unknown force."""
 
     name: Name = key("gust", "prefix of its quantities")
     scale: Finite = key(..., "an order of magnitude of the wind", "m/s", gt=0)
@@ -223,9 +223,9 @@ class Drive(Section):
 
 
 class Wind(Section):
-    """[scene.wind]: the wind around the cloths that have `air_normal` or `air_tangential`. A constant one is the
-    quantities wind_x, wind_y and wind_z; a changing one is multiplied by wind_strength, and with at most 50 knots it is
-    wind_x_0, wind_y_0, wind_z_0, wind_x_1 and so on."""
+    """[scene.wind]: the wind around the cloths that have `air_normal` or `air_tangential`, and around what has drag,
+    such as a rope with `drag_linear`. A constant one is the quantities wind_x, wind_y and wind_z; a changing one is
+    multiplied by wind_strength, and with at most 50 knots it is wind_x_0, wind_y_0, wind_z_0, wind_x_1 and so on."""
 
     velocity: Vector | list[Vector] = key(..., "one, or one at each of the times", "m/s")
     times: list[Finite] | None = key(
@@ -305,10 +305,4 @@ class SceneSection(Section):
                     f"has a collider on tool {collider.tool}, whose shift_sd and turn_sd would not move it|"
                     f"{fix} [parameters.{collider.name}_x]"
                 )
-        return self
-
-    @model_validator(mode="after")
-    def _wind_blows_on_something(self) -> Self:
-        if (self.wind or self.unknown_wind) and not any(cloth.in_air for cloth in self.cloth):
-            raise ValueError("has a wind that blows on nothing|give air_normal to a [[scene.cloth]]")
         return self

@@ -76,12 +76,12 @@ def build_scene(
         particles.add_solid(built, configured)
         for name, mean in means.items():
             particles.add(particles.free_name(f"{path}.mean", name), [mean])
-    add_winds(scene, section)
     _add_particles(scene, particles, section)
     for path, pendulum in _each("pendulum", section.pendulum):
         _add_arm(scene, particles, path, pendulum)
     for path, arm in _each("arm", section.arm):
         _add_arm(scene, particles, path, arm)
+    add_winds(scene, section)
     _add_constraints(scene, particles, section)
     for path, mass in _each("point_mass", section.point_mass):
         with located(path):

@@ -149,9 +149,9 @@ def _collect(
         weight = 1.0 if log else abs(value) if step[0] else factor
         made.append((weight, Told(i, name, name, q.unit, step[1:], _NONE, value=value, relative=step[0])))
         asked.append((name, k, log))
-    blown, moves = drafts(problem, u, i, e.scene.compiled.inputs(own))
+    blown, moves = drafts(problem, u, i)
     added: dict[str, Any] = {}  # by any names, for two errors may share a label
-    for given in told_inputs(e, own, blown.experiments[i]):
+    for given in told_inputs(e, own):
         one = Told(i, given.name, given.label, given.unit, given.step, _NONE, missing=given.says)
         made.append((1.0, replace(one, signed=given.says is not None, relative=not (given.unit or given.says))))
         added[f"{given.label}, {len(added)}"] = given.added

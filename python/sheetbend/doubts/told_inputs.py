@@ -67,12 +67,11 @@ class ToldInput:
     says: Says | None = None
 
 
-def told_inputs(e: Experiment, theta: Array, loaded: Experiment) -> list[ToldInput]:
+def told_inputs(e: Experiment, theta: Array) -> list[ToldInput]:
     """All of one experiment.
 
     Args:
         theta: (quantities,) of its scene.
-        loaded: the experiment with the forces that its motion has (`drafts`), whose tangents will be taken.
     """
     inputs = e.scene.compiled.inputs(theta)
     return [
@@ -82,7 +81,7 @@ def told_inputs(e: Experiment, theta: Array, loaded: Experiment) -> list[ToldInp
             _colliders(e),
             _path(e, inputs),
             _grips(e, inputs),
-            _loads(loaded, theta),
+            _loads(e, theta),
             _speed(e),
             _unnamed(e),
             (_made("isotropy", one.label, one.added, one.says) for one in alike(e.scene, inputs)),

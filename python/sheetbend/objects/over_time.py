@@ -119,7 +119,8 @@ def add_unknown_force(
 
 
 def add_unknown_wind(scene: Scene, *, scale: float, spacing: float, duration: float, name: str = "gust") -> OverTime:
-    """Let an unknown wind over time blow on all triangles in air, added to the scene's constant wind (`Scene.add_air`).
+    """Let an unknown wind over time blow on all triangles in air (`Scene.add_air`) and on what has drag, such as a rope
+    with `drag_linear`, added to the scene's constant wind (`Scene.set_wind`).
 
     Args:
         scale: m/s, an order of magnitude of the wind.
@@ -130,8 +131,8 @@ def add_unknown_wind(scene: Scene, *, scale: float, spacing: float, duration: fl
         OverTime, also kept as `scene.over_time[name]`.
 
     Raises:
-        SceneError: no triangles in air, the wind changes already, numbers that are not positive, or a spacing that is
-            longer than the motion.
+        SceneError: nothing in air and nothing with drag, the wind changes already, numbers that are not positive, or a
+            spacing that is longer than the motion.
     """
     check_scene(scene)
     found = _over_time(scene, name, "wind", "m/s", scale, spacing, duration)

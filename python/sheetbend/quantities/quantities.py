@@ -105,6 +105,7 @@ class Builder(Protocol):
     """A scene under construction, as seen by what adds particles' loads and named numbers to it."""
 
     terms: list[Term]
+    has_drag: bool
 
     @property
     def particle_count(self) -> int: ...

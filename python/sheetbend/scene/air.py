@@ -1,4 +1,4 @@
-"""Air and pressure on triangles: what a scene knows of them, and how they are added."""
+"""Air and pressure on triangles, and the scene's wind: what a scene knows of them, and how they are added."""
 
 from __future__ import annotations
 
@@ -50,11 +50,37 @@ class Air:
         corners = triangle_array(f"{name}.air.triangles", triangles, scene.particle_count)
         given = {"normal": normal, "tangential": tangential}
         values = {kind: _coefficient(f"{name}.air.{kind}", k, len(corners)) for kind, k in given.items()}
-        self._blow(scene, wind, times)
+        self.blow(scene, wind, times)
         for kind, k in values.items():
             if np.ndim(given[kind]) == 0:
                 self._name(scene, name, f"air_{kind}", k, "kg/m^3")
         self._append(corners, values)
+
+    def blow(self, scene: Builder, wind: ArrayLike | None, times: ArrayLike | None = None) -> None:
+        """Set the wind, or check that it is the one that was set (`Scene.set_wind`)."""
+        if wind is None:
+            if times is not None:
+                raise SceneError("wind", "is missing", None, "give it at every one of the times")
+            if self._blowing is not None:
+                return
+            wind = (0.0, 0.0, 0.0)
+        t = np.zeros(1) if times is None else finite("wind.times", times, None, SceneError).ravel()
+        check_increasing("wind.times", t)
+        w = finite("wind", wind, (3,) if times is None else (len(t), 3), SceneError).reshape(-1, 3)
+        if self._blowing is not None:
+            before_t, before_w = self._blowing
+            if not (np.array_equal(t, before_t) and np.array_equal(w, before_w)):
+                fix = "leave it out, the wind of a scene is one, or call set_wind before add_air"
+                raise SceneError("wind", "differs from the one given before", w[0].tolist(), fix)
+            return
+        self._blowing = (t, w)
+        self.times, self.wind = t, w.copy()
+        if times is None:
+            for place, (quantity, velocity) in enumerate(zip(WIND, w[0], strict=True)):
+                _name_wind(scene, place, quantity, velocity)
+        else:
+            _name_changing_wind(scene, w)
+        self.wind[:] = 0.0
 
     def press(self, scene: Builder, triangles: ArrayLike, pressure: ArrayLike, name: str) -> None:
         """See `Scene.add_pressure`."""
@@ -71,14 +97,13 @@ class Air:
         """Take knots (knots,) s at which a wind that is constant so far may change.
 
         Raises:
-            SceneError: no triangles, or it changes already.
+            SceneError: nothing is in air or has drag, or it changes already.
         """
-        if not len(self.triangles):
-            raise SceneError(
-                "wind", "blows on nothing", None, "call Scene.add_air first (air_normal of a cloth in a configuration)"
-            )
+        if not len(self.triangles) and not scene.has_drag:
+            fix = "give something drag (drag_linear of a rope), or call Scene.add_air first (air_normal of a cloth)"
+            raise SceneError("wind", "blows on nothing", None, fix)
         if self._blowing is None:
-            self._blow(scene, None, None)
+            self.blow(scene, None)
         if len(self.times) > 1:
             fix = "give a constant wind, or none; of a wind that is given over time the quantities are the unknowns"
             raise SceneError("wind", "changes over given times already", len(self.times), fix)
@@ -121,32 +146,6 @@ class Air:
         self.triangles = np.concatenate([self.triangles, corners])
         for kind in ("normal", "tangential", "pressure"):
             setattr(self, kind, np.concatenate([getattr(self, kind), values.get(kind, np.zeros(len(corners)))]))
-
-    def _blow(self, scene: Builder, wind: ArrayLike | None, times: ArrayLike | None) -> None:
-        """Set the wind, or check that it is the one that was set."""
-        if wind is None:
-            if times is not None:
-                raise SceneError("wind", "is missing", None, "give it at every one of the times")
-            if self._blowing is not None:
-                return
-            wind = (0.0, 0.0, 0.0)
-        t = np.zeros(1) if times is None else finite("wind.times", times, None, SceneError).ravel()
-        check_increasing("wind.times", t)
-        w = finite("wind", wind, (3,) if times is None else (len(t), 3), SceneError).reshape(-1, 3)
-        if self._blowing is not None:
-            before_t, before_w = self._blowing
-            if not (np.array_equal(t, before_t) and np.array_equal(w, before_w)):
-                fix = "leave it out, the wind of a scene is one"
-                raise SceneError("wind", "differs from the one given before", w[0].tolist(), fix)
-            return
-        self._blowing = (t, w)
-        self.times, self.wind = t, w.copy()
-        if times is None:
-            for place, (quantity, velocity) in enumerate(zip(WIND, w[0], strict=True)):
-                _name_wind(scene, place, quantity, velocity)
-        else:
-            _name_changing_wind(scene, w)
-        self.wind[:] = 0.0
 
 
 def _name_wind(scene: Builder, place: int, quantity: str, velocity: float, *factors: tuple[str, str]) -> None:

@@ -14,6 +14,7 @@ from ..errors import SceneError
 from ..mesh.triangle_mesh import TriangleMesh
 from ..quantities.kinds import KINDS
 from ..quantities.quantities import ZERO_OR_MORE, Term, product
+from .blown import BlownScene
 from .bodies import (
     HasPoses,
     Path,
@@ -32,7 +33,6 @@ from .body import Body, BodyPoint
 from .body_force import push_body
 from .body_points import points_of
 from .colliders import Collider
-from .collisions import CollidingScene
 from .compiled import CompiledScene
 from .contacts import ContactNumbers, HasParticles
 from .group import make_group
@@ -42,7 +42,7 @@ from .scene_checks import validate
 Array = np.ndarray
 
 
-class Scene(CollidingScene):
+class Scene(BlownScene):
     """A scene under construction; `freeze()` (done by the first simulation) ends the construction.
 
     Every number enters either as a plain value or as a named quantity (`<group>_<quantity>`), by which gradients, fits
@@ -222,7 +222,8 @@ class Scene(CollidingScene):
         self.add_terms([product("mass", index, 1.0, {f"{name}_mass": "identity"})])
 
     def set_drag(self, linear: ArrayLike | None = None, quadratic: ArrayLike | None = None) -> None:
-        """Air drag per particle: linear (n,) N s/m and quadratic (n,) N s^2/m^2, force -(c1 + c2 |v|) v."""
+        """Air drag per particle: linear (n,) N s/m and quadratic (n,) N s^2/m^2, force -(c1 + c2 |v|) v, where v is the
+        velocity relative to the scene's wind (`set_wind`)."""
         self._building()
         for field, values in (("linear", linear), ("quadratic", quadratic)):
             if values is None:
@@ -232,59 +233,6 @@ class Scene(CollidingScene):
                 raise SceneError(f"drag.{field}", "must not be negative", float(c.min()), "give zero or more")
             self._drag[field] = c
             self.has_drag = True
-
-    def add_air(
-        self,
-        triangles: ArrayLike,
-        normal: ArrayLike,
-        tangential: ArrayLike,
-        wind: ArrayLike | None = None,
-        times: ArrayLike | None = None,
-        name: str = "cloth",
-    ) -> None:
-        """Let air act on triangles: A (k_n |u_n| u_n + k_t |u_t| u_t) on each, a third to every corner, where the wind
-        relative to the triangle, u, parts into u_n along its normal and u_t across it.
-
-        k is air density * drag coefficient / 2 (air: 1.2 kg/m^3). One value for all is the quantity
-        `<name>_air_normal` or `<name>_air_tangential`; a constant wind is the quantities `wind_x`, `wind_y`, `wind_z`.
-        A changing one is multiplied by `wind_strength` and, with at most 50 knots, is `wind_x_0`, `wind_y_0`,
-        `wind_z_0`, `wind_x_1` and so on.
-        The force is taken at the extrapolated state, so substeps must resolve it: with BDF2 h k |u| must stay below 2/3
-        of the area density. `set_drag` has no such limit, and knows no wind.
-
-        Args:
-            triangles: (count, 3) particles.
-            normal, tangential: k_n, k_t, one for all or (count,), kg/m^3.
-            wind: m/s, one for the whole scene: (3,), or (knots, 3) at `times`; still air, or that of an earlier call,
-                by default.
-            times: (knots,) s, increasing; the wind is linear between and constant outside.
-            name: of the quantities.
-
-        Raises:
-            SceneError: shapes, NaN, negative coefficients, corners that are not distinct, times that do not increase,
-                or another wind than an earlier call's.
-        """
-        self._building()
-        self.air.add(self, triangles, normal, tangential, wind, times, name)
-
-    def add_pressure(self, triangles: ArrayLike, pressure: ArrayLike, name: str = "cloth") -> None:
-        """Let a pressure push triangles along their normals, (x1 - x0) x (x2 - x0): pressure * area on each, a third to
-        every corner.
-
-        One value for all is the quantity `<name>_pressure`. The force is taken at the extrapolated state, so substeps
-        must resolve it: h^2 p/(area density * edge) must stay well below 1 (a balloon is calm at 0.02, not at 0.35).
-        `equilibrium` takes it where it has an energy: a closed surface, or one with a held rim, under one pressure.
-
-        Args:
-            triangles: (count, 3) particles; those of a closed surface, counterclockwise from outside, are blown up.
-            pressure: Pa, one for all or (count,), inside above outside.
-            name: of the quantity.
-
-        Raises:
-            SceneError: shapes, NaN, or corners that are not distinct.
-        """
-        self._building()
-        self.air.press(self, triangles, pressure, name)
 
     def add_volume(
         self, triangles: ArrayLike, *, compliance: float = 0.0, rest: float | None = None, name: str = "cloth"

@@ -32,7 +32,7 @@ _TORCH: Mapping[str, Callable[[Tensor], Tensor]] = {
 NEEDS = {
     "force": "scene.add_force(particles, forces)",
     "boundary": "scene.drive(particles, times, positions)",
-    "wind": "scene.add_air(triangles, ...)",
+    "wind": "scene.set_wind(velocity)",
     "pressure": "scene.add_pressure(triangles, ...)",
 }
 """What gives a scene the arrays that it may lack."""
