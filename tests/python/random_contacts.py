@@ -1,4 +1,4 @@
-"""Small random scenes with contacts, and their derivatives by three ways: reverse, forward tangents, differences.
+"""Small random scenes with contacts, and three ways to their derivatives: reverse, forward tangents, differences.
 
     python tests/python/random_contacts.py [--first 0] [--seconds 3600]
 
