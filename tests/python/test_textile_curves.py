@@ -165,6 +165,13 @@ def test_a_fabric_from_its_pulls(along):
     assert "no unloading" in str(found)
 
 
+def test_grips_that_slip_are_seen_by_no_curve():
+    """In proportion to the stretch: warp came out 17 % low, "known to 3 %". The report says what it takes as exact."""
+    found = textile.fit_pull([recorded(FABRIC, "warp", share=1.2)], "warp")
+    assert found.misfit < 1.0 and found.fabric.warp / FABRIC.warp < 0.9
+    assert "no curve shows it" in " ".join(str(found).split())
+
+
 def test_a_law_that_stiffens_fast_reaches_its_load():
     """60 N/m on 148 N/m: half of the linear strain would be a tension of e^67."""
     stiff = replace(FABRIC, warp=148.0, law=sb.laws.Exponential(1400.0, 1400.0, 1400.0))

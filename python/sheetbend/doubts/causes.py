@@ -59,6 +59,8 @@ class Wrong:
         times: what they leave beyond noise, as a multiple of the noise, or of what sigma allows where that is more.
         sure: explains nearly all; else a third or more of what is much more than noise.
         driven: with all taken out that another driven motion would explain.
+        fitted: with the number fitted along, not to first order.
+        causes: what explains so much of it, where it is not sure.
     """
 
     motions: tuple[int, ...]
@@ -68,6 +70,8 @@ class Wrong:
     times: float
     sure: bool = True
     driven: bool = False
+    fitted: bool = False
+    causes: tuple[Cause, ...] = ()
 
 
 def seen_beside(q: Array, tried: Sequence[tuple[Told, Array]]) -> list[tuple[Told, Array, Array]]:

@@ -50,7 +50,7 @@ def tangents(
     at = [float(np.log(own[slot]) if log else own[slot]) for _, slot, log in quantities] + [0.0] * len(names)
     d = e.core(problem.recordings[i], corrected)
     terms = [
-        Term(array, where, by, ((name, "identity"),)) for name, v in added.items() for array, where, by in _inputs(v)
+        Term(array, where, by, ((name, "identity"),)) for name, v in added.items() for array, where, by in inputs_of(v)
     ]
     terms = [*e.extra_terms(), *e.sensor_terms(), *terms]
     map_ = e.scene.compiled.map(3 * len(e.compared) + 1, terms, [*e.scene.quantities, *names])
@@ -68,7 +68,10 @@ def tangents(
     return np.asarray(columns)
 
 
-def _inputs(added: Array | Input | list[Input]) -> list[Input]:
+def inputs_of(added: Array | Input | list[Input] | None) -> list[Input]:
+    """What one unit of an error adds, as a list."""
+    if added is None:
+        return []
     if isinstance(added, list):
         return added
     return [added if isinstance(added, tuple) else ("gravity", np.arange(3), added)]

@@ -26,7 +26,7 @@ from ..scene.air import WIND
 from .draft import drafts
 from .lead import Lead, leads
 from .sensor_errors import sensor_errors
-from .tangents import Part, tangents
+from .tangents import Input, Part, tangents
 from .told_inputs import AXES, STEPS, gravity_turns, told_inputs
 from .told_inputs import GROUPS as OF_INPUTS
 
@@ -74,6 +74,7 @@ class Told:
         marker: whose place it is.
         missing: of what has no number in the model, such as what it lacks (`missing_parts`): what a size of it says.
         signed: whether there may be less than none of what is missing.
+        added: what one unit of it adds to inputs of the scene, of what is an error of these.
     """
 
     experiment: int
@@ -88,6 +89,7 @@ class Told:
     marker: str = ""
     missing: Callable[[float], str] | None = None
     signed: bool = False
+    added: Array | Input | list[Input] | None = None
 
 
 def told_numbers(problem: FitProblem, u: Array) -> tuple[list[Told], str]:
@@ -116,8 +118,9 @@ def of_parts(problem: FitProblem, u: Array, i: int, parts: Sequence[Part], corre
         columns = tangents(problem, u, i, {label: added for label, added, _ in parts}, corrected=corrected)
     except SheetbendError:
         return []
+    signed = ("velocity", "rest", "position")
     return [
-        Told(i, "", label, "", (0.0, ""), column, missing=says, signed=added[0] in ("velocity", "rest", "position"))
+        Told(i, "", label, "", (0.0, ""), column, missing=says, signed=added[0] in signed, added=added)
         for (label, added, says), column in zip(parts, columns.T, strict=True)
     ]
 
@@ -153,7 +156,8 @@ def _collect(
     added: dict[str, Any] = {}  # by any names, for two errors may share a label
     for given in told_inputs(e, own):
         one = Told(i, given.name, given.label, given.unit, given.step, _NONE, missing=given.says)
-        made.append((1.0, replace(one, signed=given.says is not None, relative=not (given.unit or given.says))))
+        one = replace(one, signed=given.says is not None, relative=not (given.unit or given.says), added=given.added)
+        made.append((1.0, one))
         added[f"{given.label}, {len(added)}"] = given.added
     for axis, more in enumerate(moves):
         label = f"{DRAFT} {AXES[axis]}"

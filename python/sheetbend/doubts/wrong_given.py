@@ -34,6 +34,7 @@ from .causes import MOST, Cause, Wrong, beyond_chance, causes, of_noise, of_what
 from .contradictions import residual_shifts, value_words
 from .directions import EXPLAINS, noise_in, rows_of, tied
 from .driven_errors import FEW, driven_errors, driven_span
+from .followed import followed
 from .held_losses import held_names
 from .lacking import Lacking
 from .losses_at_zero import is_loss
@@ -84,7 +85,7 @@ def wrong_given(
             found = _asked(problem, u, r, J, told, lacking, np.column_stack(shifts), driven)
         return found
 
-    found = asked()
+    found = [one if one.sure or one.times <= FAR else followed(problem, u, one) for one in asked()]
     if problem.estimates_corrections:
         return found
     sure = {one.motions for one in found if one.sure}
@@ -184,7 +185,8 @@ def _asked(
             moved = [np.sum([more * column for _, more, column in c.parts], axis=0) for c in asked]
             steps = tuple(there + (-inverse @ (q.T @ by))[:count] for by in moved)
             share, beside = asked[0].explained, driven is not None
-            found.append(Wrong(tuple(group), words, steps, share, left / allowed, sure, beside))
+            causes_left = () if sure else tuple(asked)
+            found.append(Wrong(tuple(group), words, steps, share, left / allowed, sure, beside, causes=causes_left))
     return found
 
 
@@ -252,7 +254,8 @@ def doubts_of(problem: FitProblem, u: Array, judged: Identifiability, wrong: Seq
                 which = "With that" if len(one.words) == 1 else f"If {words},"
                 there = value_words(p, u[k], step, reach)
                 cause = _sentence(problem, one) if one.sure else _unsure(problem, one)
-                moved[name] = f"{cause}. {which} it would be {there} (to first order)"
+                order = "fitted along" if one.fitted else "to first order"
+                moved[name] = f"{cause}. {which} it would be {there} ({order})"
         if moved and not one.sure and one.times > FAR:
             others = {name for i in one.motions for name in problem.acting_on(problem.experiments[i])} - set(moved)
             why = (

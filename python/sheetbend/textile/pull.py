@@ -35,6 +35,10 @@ LAWS = {
 WEIGHTS = (0.0, 1.0, 2.0, 3.0)
 """Powers among which `fit_pull` chooses."""
 
+_TAKEN = (
+    "width, and strain as stretch of the fabric, are taken as exact: 1 % more width, or grips that slip by 1 % of the "
+    "stretch, move a stiffness by 1 %, and no curve shows it"
+)
 _SPECIMEN = (0.05, 0.2)  # m, length and width of KES-FB1, where curves do not tell theirs
 _LEVELS = 5
 _MOST_LEVELS = 1000
@@ -273,7 +277,8 @@ def _test(along: str, load: float, width: float, length: float, cells: int) -> C
 def _left_out(curves: Sequence[Curve], cycle: int, way: str) -> str:
     lost = [part for part in (chosen(c, cycle).lost for c in curves) if part is not None]
     if not lost:
-        return "the curves have no unloading, so what a loop would lose is not known"
+        return f"the curves have no unloading, so what a loop would lose is not known; {_TAKEN}"
     follows = {"skeleton": "the mean of loading and unloading"}.get(way, way)
     percent = 100.0 * float(np.mean(lost))
-    return f"the specimens lose {percent:.0f} % of the work of loading; the fabric is elastic and follows {follows}"
+    loses = f"the specimens lose {percent:.0f} % of the work of loading"
+    return f"{loses}; the fabric is elastic and follows {follows}; {_TAKEN}"
