@@ -45,7 +45,7 @@ def restless(recording: Recording, noise: Array) -> Strangers | None:
     x, count = recording.positions, len(noise)
     if count < FEWEST or not np.isfinite(noise).any():
         return None
-    found, spread = [], np.sqrt(np.nanvar(x, axis=0).mean(axis=1))
+    found, spread = list[int](), np.sqrt(np.nanvar(x, axis=0).mean(axis=1))
     for k in np.flatnonzero((noise > RESTLESS * np.nanmedian(noise)) & (noise > WHITE * spread)):
         others = np.delete(x, k, axis=1)
         size = np.linalg.norm(np.subtract(*np.nanquantile(others, [0.99, 0.01], axis=(0, 1))))
