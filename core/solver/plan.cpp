@@ -11,6 +11,7 @@
 
 #include "core/linear/low_fill.h"
 #include "core/solver/block_frames.h"
+#include "core/solver/body_loops.h"
 #include "core/solver/ordering.h"
 #include "core/solver/paired_pattern.h"
 #include "core/solver/plan_checks.h"
@@ -71,7 +72,9 @@ FactorStructure structure_of(const Scene& scene, const std::vector<Member>& memb
       for (const int column : rows)
         if (column <= row) entries.emplace_back(row, column);
   const int rows = members.back().first_row + scene.groups[members.back().group].rows;
-  return {rows + static_cast<int>(volumes.size()), entries, volumes.empty(), redundant_pivot};
+  const bool loop = closes_loop(scene, members);
+  return {rows + static_cast<int>(volumes.size()), entries, volumes.empty() && !loop,
+          loop ? pivot_of_loop : redundant_pivot};
 }
 
 // A particle of the block, with the rows that it takes part in. Windows of a band have no gaps: rows between that do not touch the particle

@@ -17,22 +17,24 @@ def test_gradient_of_a_random_mechanism_is_exact(seed: int) -> None:
     assert max(found.values()) < BOUND, parts
 
 
-@pytest.mark.parametrize("seed", [9, 14, 57, 79])
-def test_spin_is_not_kept_beside_constraints_that_follow_from_others(seed: int) -> None:
-    """Seeds that diverged within six substeps: a door on two hinges beside bodies that keep their spin."""
+@pytest.mark.parametrize("seed", [9, 14, 57, 79, 189])
+def test_a_door_on_two_hinges_whose_bodies_turn_apart_in_a_substep(seed: int) -> None:
+    """Seeds that diverged within six substeps, or had forces of 40 kN and a gradient that was off by 16 %: bodies that
+    keep their spin, or a drag that one of them has, turn the bodies apart where the substep begins."""
     scene, solver, parts = scene_of(seed)
-    assert "two hinges" in parts and "spin kept" in parts
-    with pytest.raises(sb.SceneError, match=r"follow from others.*second hinge of a door"):
-        sb.simulate(scene, [0.0, 0.01], solver)
+    assert "two hinges" in parts and solver.method == "direct"
+    with pytest.warns(sb.RedundantConstraintsWarning, match="have no effect. Fix: remove"):
+        motion = sb.simulate(scene, [0.0, 0.002, 0.004], solver)
+    assert max(np.abs(f).max() for name, f in motion.forces.items() if name.startswith("j")) < 500.0  # N
+    found, _ = differs(seed)
+    assert max(found.values()) < BOUND, parts
 
 
-def test_a_door_on_two_hinges_is_right_with_implicit_and_direct_warns() -> None:
-    """Drag turns its two bodies apart in the prediction of a substep, so that `direct` does not see which rows follow
-    from others. `implicit` finds the forces, and refuses their derivative."""
-    scene, solver, parts = scene_of(189)
-    assert parts == "direct, body, ball, body, two hinges"
-    with pytest.warns(sb.RedundantConstraintsWarning, match=r"not recognized, and the forces between them"):
-        sb.simulate(scene, [0.0, 0.002], solver)
+def test_newton_warns_where_it_does_not_see_what_follows_from_others() -> None:
+    """`implicit` finds the forces, and refuses their derivative."""
+    scene, solver, _ = scene_of(189)
+    with pytest.warns(sb.RedundantConstraintsWarning, match="not recognized, and the forces between them"):
+        sb.simulate(scene, [0.0, 0.002], replace(solver, method="newton"))
     careful = replace(solver, method="implicit")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", sb.RedundantConstraintsWarning)

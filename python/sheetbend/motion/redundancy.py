@@ -14,8 +14,8 @@ def warn_redundant(where: str, which: str, turning: bool = False) -> None:
     """Warn that a scene has such constraints; `which` is the core's description, empty where there are none. A row that
     follows from no other is no such constraint: its pivot is lost in rounding, or no number.
 
-    Such a row is recognized where its constraints are fulfilled. In rollouts of bodies (`turning`) that are solved
-    otherwise than until forces balance, they are not while drag or loads turn bodies apart within a substep.
+    Such a row is recognized where its constraints are fulfilled. With `newton` and `newton_cg` (`turning`) it is not
+    while drag or loads turn bodies apart within a substep.
     """
     if not which:
         return

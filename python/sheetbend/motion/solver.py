@@ -7,7 +7,7 @@ from typing import Any, Literal, cast
 
 from .. import _core
 from ..arrays.checks import is_number
-from ..errors import InputError, SceneError, refusal
+from ..errors import InputError, refusal
 from ..files.memory import free_memory, in_bytes
 from ..scene.compiled import CompiledScene
 from .extrapolation import MOST, Extrapolated, weights
@@ -141,7 +141,6 @@ class Solver:
 
         Raises:
             InputError: the method cannot step the scene, such as "implicit" with a kept volume.
-            SceneError: bodies that keep their spin beside rigid constraints that follow from others.
 
         Warns:
             RedundantConstraintsWarning: some rigid constraints follow from others at the start; "gauss_seidel" leaves
@@ -176,15 +175,8 @@ class Solver:
         if self.method == "direct" or (
             self.method != "gauss_seidel" and not (inputs[offset : offset + size] > 0).all()
         ):
-            which = core.redundant(inputs, 0.0)
-            if which and scene.keeps_spin:
-                problem = (
-                    "has bodies that keep their spin, and rigid constraints that follow from others: such bodies turn"
-                )
-                problem += " as these do not say, and the forces between them grow without a bound"
-                fix = "leave out keep_spin, or what is there twice, such as the second hinge of a door"
-                raise SceneError(scene.name, problem, which, fix)
-            warn_redundant(scene.name, which, turning="rigid" in scene.kinds and self.method != "implicit")
+            turning = "rigid" in scene.kinds and self.method in ("newton", "newton_cg")
+            warn_redundant(scene.name, core.redundant(inputs, 0.0), turning)
         return core
 
 

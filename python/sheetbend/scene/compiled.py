@@ -74,7 +74,6 @@ class CompiledScene:
         theta: their values.
         contacts: names of those that particles may have with colliders.
         has_means: whether it has particles at the mean of others.
-        keeps_spin: whether any body does.
         touches_itself: whether any rope or cloth may touch itself or another, or particles may hit each other.
         kinks: what beside contacts makes its motions not smooth in time, in words; empty if nothing.
         bends_over_values: whether any of it makes motions not smooth over quantities, either.
@@ -104,7 +103,6 @@ class CompiledScene:
         self._terms = scene.every_term
         self.contacts = tuple(c.name for c in scene.contacts.contacts)
         self.has_means = bool(scene.means)
-        self.keeps_spin = any(body.spin_node is not None for body in scene.bodies.values())
         self.touches_itself = bool(scene.contacts.pieces) or scene.contacts.balls is not None
         self.settled: dict[str, SettledStart] = {}
         self.fastest: tuple[Fastest, ...] = ()
