@@ -32,10 +32,9 @@ else()
 endif()
 list(JOIN variants ", " text)
 message(STATUS "sheetbend: kernels ${text}")
-set(choices core/packs/choose.cpp core/solver/packed_contacts.cpp)
 foreach(variant IN LISTS variants)
   string(TOUPPER ${variant} text)
-  set_property(SOURCE ${choices} APPEND PROPERTY COMPILE_DEFINITIONS SHEETBEND_KERNELS_${text})
+  set_property(SOURCE core/packs/choose.cpp APPEND PROPERTY COMPILE_DEFINITIONS SHEETBEND_KERNELS_${text})
 endforeach()
 
 # The kinds in the order of the registry, and of each its header and whether it says `hot = true` or `hot_in_blocks = true` (core/constraints/concept.h).

@@ -101,6 +101,21 @@ void rebound_vjp(const ContactSource<T>& source, const ColliderPoses<Single<T>>&
   surface_vjp(source, contact, f.surface, poses_bar, in_bar);
 }
 
+// Reverse of ContactSource::shared_numbers, but for the mass in the stiffness of a rigid contact.
+template <class T>
+void shared_numbers_vjp(const ContactSource<T>& source, int contact, const ContactNumbers<Single<T>>& bar,
+                        const Inputs<T>& in_bar) {
+  using S = Single<T>;
+  const Contact& c = source.scene.contacts[contact];
+  source.add(bar.friction, in_bar.of(Quantity::friction)[contact]);
+  source.add(bar.radius, in_bar.of(Quantity::contact_radius)[contact]);
+  size_vjp(source, source.scene.colliders[c.collider], bar.size, in_bar);
+  if (c.dissipation >= 0)
+    source.add(bar.loss / S(source.bdf.eta), in_bar.of(Quantity::contact_dissipation)[c.dissipation]);
+  if (c.stiffness >= 0)
+    source.add(S(source.bdf.eta * source.bdf.eta) * bar.kappa, in_bar.of(Quantity::contact_stiffness)[c.stiffness]);
+}
+
 // Reverse of ContactSource::numbers; w_bar(node) takes cotangents of inverse masses.
 template <class T, class W>
 void numbers_vjp(const ContactSource<T>& source, const ColliderPoses<Single<T>>& poses, int contact, int item,
@@ -109,7 +124,6 @@ void numbers_vjp(const ContactSource<T>& source, const ColliderPoses<Single<T>>&
   using S = Single<T>;
   const Scene& scene = source.scene;
   const Contact& c = scene.contacts[contact];
-  const Collider& collider = scene.colliders[c.collider];
   const auto history = [&](double weight, const std::vector<Pose<S>>& pose, std::vector<Pose<S>>& pose_bar, const T* x,
                            T* x_bar) {
     const Vec3<S> point_bar =
@@ -124,21 +138,14 @@ void numbers_vjp(const ContactSource<T>& source, const ColliderPoses<Single<T>>&
     rebound_vjp(source, poses, contact, item, {eta2 * bar.carried, bar.lift, bar.leaving}, poses_bar, from_bar, in_bar);
   else
     source.add(eta2 * bar.carried, from_bar.x + scene.first_dof[c.carried[item]]);
-  source.add(bar.friction, in_bar.of(Quantity::friction)[contact]);
-  source.add(bar.radius, in_bar.of(Quantity::contact_radius)[contact]);
-  size_vjp(source, collider, bar.size, in_bar);
-  if (c.dissipation >= 0)
-    source.add(bar.loss / S(source.bdf.eta), in_bar.of(Quantity::contact_dissipation)[c.dissipation]);
-  if (c.stiffness >= 0) {
-    source.add(eta2 * bar.kappa, in_bar.of(Quantity::contact_stiffness)[c.stiffness]);
-    return;
-  }
+  shared_numbers_vjp(source, contact, bar, in_bar);
+  if (c.stiffness >= 0) return;
   const S w = source.inverse_mass(c, item);
   const double share = source.bdf.eta / source.h;
   inverse_mass_vjp(source, c, item, -(S(rigidity * share * share) * bar.kappa / (w * w)), w_bar, in_bar);
 }
 
-// Reverse of ContactSource::poses.
+// Reverse of ContactSource::find_poses.
 template <class T>
 void poses_vjp(const ContactSource<T>& source, const ColliderPoses<Single<T>>& bar, const Inputs<T>& in_bar) {
   using S = Single<T>;

@@ -33,15 +33,10 @@ void PackedContactCotangents::spread(const ContactSource<T>& source, const Swept
   const Contact& c = source.scene.contacts[group.contact];
   contact_kernels().numbers_vjp(contacts.contacts(), cotangents(), scene_points(from_bar.x, 3, source.lane),
                                 scene_points(from_bar.x_before, 3, source.lane), scene_points(w_bar, 1, source.lane));
-  source.add(sum(shared_, 0), in_bar.of(Quantity::friction)[group.contact]);
-  source.add(sum(shared_, 1), in_bar.of(Quantity::contact_radius)[group.contact]);
-  if (c.dissipation >= 0)
-    source.add(sum(shared_, 2) / source.bdf.eta, in_bar.of(Quantity::contact_dissipation)[c.dissipation]);
-  if (c.stiffness >= 0)
-    source.add(contacts.contacts().eta2 * sum(shared_, 3), in_bar.of(Quantity::contact_stiffness)[c.stiffness]);
-  double size[most_sizes];
-  for (int k = 0; k < most_sizes; ++k) size[k] = sum(shared_, 4 + k);
-  size_vjp(source, source.scene.colliders[c.collider], size, in_bar);
+  ContactNumbers<double> bar{};
+  bar.friction = sum(shared_, 0), bar.radius = sum(shared_, 1), bar.loss = sum(shared_, 2), bar.kappa = sum(shared_, 3);
+  for (int k = 0; k < most_sizes; ++k) bar.size[k] = sum(shared_, 4 + k);
+  shared_numbers_vjp(source, group.contact, bar, in_bar);
   add_pose(next_, poses_bar.next[c.collider]);
   add_pose(now_, poses_bar.now[c.collider]);
   if (!poses_bar.before.empty()) add_pose(before_, poses_bar.before[c.collider]);

@@ -97,6 +97,19 @@ void finish_block(const Scene& scene, const DirectBlock& block, const Inputs<con
   bar.eta = 0.0;
 }
 
+// The arrays of one iteration with those of its reverse.
+template <class T>
+sheetbend_blocks::Block arrays_of(const DirectBlock& block, const std::vector<sheetbend_blocks::Run>& runs,
+                                  BlockState<T>& state, int iteration, BlockCotangents<T>& bar) {
+  sheetbend_blocks::Block b = arrays_of(block, runs, state, iteration);
+  b.x_bar = bar.x.numbers();
+  b.z = bar.z.numbers();
+  b.y = bar.y.numbers();
+  b.lambda_bar = bar.lambda.numbers();
+  b.C_r_bar = bar.C_r.numbers();
+  return b;
+}
+
 // Takes the cotangents of the corrected coordinates (dofs) and of the multipliers (rows of the scene; null where nothing reads them).
 template <class T>
 void begin_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const T* x_bar, const T* lambda_bar,
@@ -142,12 +155,7 @@ template <class T>
 void project_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const sheetbend_packs::KernelTable& table,
                        BlockState<T>& state, int iteration, BlockCotangents<T>& bar) {
   const auto& runs = runs_of(s, block, state, &bar.values);
-  auto arrays = arrays_of(block, runs, state, iteration);
-  arrays.x_bar = bar.x.numbers();
-  arrays.z = bar.z.numbers();
-  arrays.y = bar.y.numbers();
-  arrays.lambda_bar = bar.lambda.numbers();
-  arrays.C_r_bar = bar.C_r.numbers();
+  const auto arrays = arrays_of(block, runs, state, iteration, bar);
   const auto& reverse = reverse_kernels<T>(table);
   reverse.right_side(arrays);
   if (block.banded())

@@ -64,49 +64,36 @@ void keep_rigid_rows(BlockState<T>& state, const std::vector<T>& y, std::vector<
   }
 }
 
-// The contacts' share along p: to the coordinates of the particles that carry their points, and gathered for spread_contacts().
+// A contact's share along p, in one scene: to the coordinates of the particles that carry its point, and gathered for spread_contacts().
 template <class T>
-void pull_back_contacts(const DirectBlock& block, BlockState<T>& state, const std::vector<T>& p,
-                        BlockCotangents<T>& bar) {
-  for (int scene = 0; scene < static_cast<int>(state.contacts.size()); ++scene)
-    for (int i = 0; i < static_cast<int>(block.contacts.size()); ++i) {
-      using S = Single<T>;
-      const BlockContact& contact = block.contacts[i];
-      const BlockContacts<S>& contacts = state.contacts[scene];
-      const auto number = [&](const T& a) {
-        if constexpr (std::is_same_v<T, Pack>)
-          return a[scene];
-        else
-          return a;
-      };
-      const auto read = [&](const T* from) { return Vec3<S>(number(from[0]), number(from[1]), number(from[2])); };
-      const auto row_of = [](int particle) { return sheetbend_blocks::row * static_cast<std::size_t>(particle); };
-      const auto x_of = [&](int particle) { return read(&state.x[0][row_of(particle)]); };
-      const auto p_of = [&](int particle) { return read(&p[3 * static_cast<std::size_t>(particle)]); };
-      Vec3<S> force;
-      const Vec3<S> x_bar = bar.contacts[scene].pull_back(block, contacts, i, contacts.point(block, i, x_of),
-                                                          contacts.point(block, i, p_of), force);
-      for (int k = 0; k < contact.nodes; ++k) {
-        const int particle = contact.particles[k];
-        const std::size_t at = row_of(particle);
-        S by[4], along = dot(force, p_of(particle));
-        Vec3<S> own_bar = x_bar;
-        if (contact.nodes > 1) {
-          const S weight = contacts.weights[i][k];
-          bar.contacts[scene].weights[i][k] += along + dot(x_bar, x_of(particle));
-          along = weight * along, own_bar = weight * x_bar;
-        }
-        own_bar.store(by);
-        by[3] = along / number(state.x[0][at + 3]);
-        for (int d = 0; d < 4; ++d) {
-          T& to = bar.x[at + d];
-          if constexpr (std::is_same_v<T, Pack>)
-            to.set(scene, to[scene] + by[d]);
-          else
-            to += by[d];
-        }
-      }
+void pull_back_contact(const DirectBlock& block, BlockState<T>& state, int scene, int i, const std::vector<T>& p,
+                       BlockCotangents<T>& bar) {
+  using S = Single<T>;
+  const BlockContact& contact = block.contacts[i];
+  const BlockContacts<S>& contacts = state.contacts[scene];
+  const auto read = [&](const T* from) {
+    return Vec3<S>(in_scene(from[0], scene), in_scene(from[1], scene), in_scene(from[2], scene));
+  };
+  const auto row_of = [](int particle) { return sheetbend_blocks::row * static_cast<std::size_t>(particle); };
+  const auto x_of = [&](int particle) { return read(&state.x[0][row_of(particle)]); };
+  const auto p_of = [&](int particle) { return read(&p[3 * static_cast<std::size_t>(particle)]); };
+  Vec3<S> force;
+  const Vec3<S> x_bar = bar.contacts[scene].pull_back(block, contacts, i, contacts.point(block, i, x_of),
+                                                      contacts.point(block, i, p_of), force);
+  for (int k = 0; k < contact.nodes; ++k) {
+    const int particle = contact.particles[k];
+    const std::size_t at = row_of(particle);
+    S by[4], along = dot(force, p_of(particle));
+    Vec3<S> own_bar = x_bar;
+    if (contact.nodes > 1) {
+      const S weight = contacts.weights[i][k];
+      bar.contacts[scene].weights[i][k] += along + dot(x_bar, x_of(particle));
+      along = weight * along, own_bar = weight * x_bar;
     }
+    own_bar.store(by);
+    by[3] = along / in_scene(state.x[0][at + 3], scene);
+    for (int d = 0; d < 4; ++d) add_in_scene(by[d], scene, bar.x[at + d]);
+  }
 }
 
 // Likewise that of pairs that touch; what goes to radii and to weights of points of bodies gathers.
@@ -117,12 +104,7 @@ void pull_back_pairs(const SubstepState<T>& s, const DirectBlock& block, BlockSt
   for (int scene = 0; scene < static_cast<int>(state.implicit.size()); ++scene) {
     const PairFriction<S>& friction = state.friction[scene];
     const PairSource<T> source{s, block, state.implicit[scene].potential.pairs, friction, scene};
-    const auto add = [&](const S& a, T& to) {
-      if constexpr (std::is_same_v<T, Pack>)
-        to.set(scene, to[scene] + a);
-      else
-        to += a;
-    };
+    const auto add = [&](const S& a, T& to) { add_in_scene(a, scene, to); };
     const auto row_of = [](int particle) { return sheetbend_blocks::row * static_cast<std::size_t>(particle); };
     const auto x_of = [&](int particle) { return &state.x[0][row_of(particle)]; };
     const auto p_of = [&](int particle) {
@@ -165,62 +147,74 @@ void pull_back_pairs(const SubstepState<T>& s, const DirectBlock& block, BlockSt
   }
 }
 
+// The matrices of these scenes at the solution, and no cotangents yet.
+template <class T>
+void begin_implicit_vjp(const Scene& whole, const DirectBlock& block, Scenes scenes, BlockState<T>& state,
+                        BlockCotangents<T>& bar) {
+  for (int scene = 0; scene < static_cast<int>(state.implicit.size()); ++scene)
+    if (has(scenes, scene)) {
+      if constexpr (is_plain<T>)
+        state.implicit[scene].prepare_transposed(whole, block);
+      else
+        state.implicit[scene].factorize(whole, block);
+    }
+  for (auto& scene : bar.contacts) scene.clear();
+  for (auto& scene : bar.friction) scene.clear();
+  for (auto* gathered : {&bar.radii, &bar.weights}) std::fill(gathered->begin(), gathered->end(), T(0.0));
+  state.lambda[0].clear();  // all of it is dl
+  state.at(0).u.clear();    // J stands in no linearized row
+}
+
+// p = K^-T x'_bar and y = D^-1 J p of what is left of x'_bar; `rest` is what is left of the equations of rigid rows (empty where there are none).
+template <class T>
+void find_multipliers(const Scene& whole, const DirectBlock& block, Scenes scenes, BlockState<T>& state,
+                      std::vector<T>& p, std::vector<T>& rest, BlockCotangents<T>& bar) {
+  for (std::size_t i = 0; i < p.size(); ++i) p[i] = bar.x[sheetbend_blocks::row * (i / 3) + i % 3];
+  std::vector<T> y = rest, Jp(rest.size());
+  solve_implicit(whole, block, scenes, state, p, y);
+  bar.y.clear();
+  numbers_of_block(block, state, 0).subtract_times(p.data(), bar.y.data());
+  for (std::size_t j = 0; j < Jp.size(); ++j) Jp[j] = -bar.y[j];
+  for (int j = 0; j < block.size(); ++j) bar.y[j] = -(bar.y[j] / state.diagonal[j]);
+  keep_rigid_rows(state, y, rest, Jp, bar);
+}
+
+// z = W^-1 p, added to x_bar, with w_bar; of x'_bar is left what z and J^T y do not take.
+template <class T>
+void take_from_rest(const DirectBlock& block, const sheetbend_blocks::Block& arrays, BlockState<T>& state,
+                    const std::vector<T>& p, std::vector<T>& x_bar, BlockCotangents<T>& bar) {
+  for (int n = 0; n < static_cast<int>(block.particles.size()); ++n) {
+    const std::size_t at = sheetbend_blocks::row * static_cast<std::size_t>(n);
+    Vec3<T> left = Vec3<T>(&bar.x[at]) - transpose_times_at<T>(arrays, n, bar.y.data());
+    if (n < block.movable) {
+      const T mass = T(1.0) / state.x[0][at + 3];
+      const Vec3<T> z = mass * Vec3<T>(&p[3 * n]);
+      z.store(&bar.z[at]);
+      z.add_to(&x_bar[3 * n]);
+      left = left - z;
+      bar.x[at + 3] += dot(transpose_times_at<T>(arrays, n, state.at(0).dl.data()), z);
+    }
+    left.store(&bar.x[at]);
+  }
+}
+
 template <class T>
 void project_implicit_vjp(const SubstepState<T>& s, const DirectBlock& block, Scenes scenes,
                           const sheetbend_packs::KernelTable& table, BlockState<T>& state, BlockCotangents<T>& bar) {
   const bool has_rigid = has_rigid_rows(state);
   const bool lifts = std::any_of(state.contacts.begin(), state.contacts.end(), [](const auto& c) { return c.lifts(); });
   const int passes = (has_rigid ? 3 : 2) + (lifts ? 3 : 0);
-  for (int scene = 0; scene < static_cast<int>(state.implicit.size()); ++scene)
-    if (has(scenes, scene)) {
-      if constexpr (is_plain<T>)
-        state.implicit[scene].prepare_transposed(s.scene, block);
-      else
-        state.implicit[scene].factorize(s.scene, block);
-    }
-  for (auto& scene : bar.contacts) scene.clear();
-  for (auto& scene : bar.friction) scene.clear();
-  for (auto* gathered : {&bar.radii, &bar.weights}) std::fill(gathered->begin(), gathered->end(), T(0.0));
-  auto& own = state.at(0);
-  state.lambda[0].clear();  // all of it is dl
-  own.u.clear();            // J stands in no linearized row
-  const auto& runs = runs_of(s, block, state, &bar.values);
-  auto arrays = arrays_of(block, runs, state, 0);
-  arrays.x_bar = bar.x.numbers();
-  arrays.z = bar.z.numbers();
-  arrays.y = bar.y.numbers();
-  arrays.lambda_bar = bar.lambda.numbers();
-  arrays.C_r_bar = bar.C_r.numbers();
-
+  begin_implicit_vjp(s.scene, block, scenes, state, bar);
+  const auto arrays = arrays_of(block, runs_of(s, block, state, &bar.values), state, 0, bar);
   std::vector<T> p(3 * static_cast<std::size_t>(block.movable)), x_bar(p.size(), T(0.0));
-  std::vector<T> rest(has_rigid ? block.size() : 0, T(0.0)), y, Jp;  // of rigid rows
+  std::vector<T> rest(has_rigid ? block.size() : 0, T(0.0));
   for (int pass = 0; pass < passes; ++pass) {
-    for (std::size_t i = 0; i < p.size(); ++i) p[i] = bar.x[sheetbend_blocks::row * (i / 3) + i % 3];
-    y = rest;
-    solve_implicit(s.scene, block, scenes, state, p, y);
-    bar.y.clear();
-    numbers_of_block(block, state, 0).subtract_times(p.data(), bar.y.data());
-    if (has_rigid) {
-      Jp.resize(block.size());
-      for (int j = 0; j < block.size(); ++j) Jp[j] = -bar.y[j];
-    }
-    for (int j = 0; j < block.size(); ++j) bar.y[j] = -(bar.y[j] / state.diagonal[j]);
-    keep_rigid_rows(state, y, rest, Jp, bar);
-    for (int n = 0; n < static_cast<int>(block.particles.size()); ++n) {
-      const std::size_t at = sheetbend_blocks::row * static_cast<std::size_t>(n);
-      Vec3<T> left = Vec3<T>(&bar.x[at]) - transpose_times_at<T>(arrays, n, bar.y.data());
-      if (n < block.movable) {
-        const T mass = T(1.0) / state.x[0][at + 3];
-        const Vec3<T> z = mass * Vec3<T>(&p[3 * n]);
-        z.store(&bar.z[at]);
-        z.add_to(&x_bar[3 * n]);
-        left = left - z;
-        bar.x[at + 3] += dot(transpose_times_at<T>(arrays, n, own.dl.data()), z);
-      }
-      left.store(&bar.x[at]);
-    }
+    find_multipliers(s.scene, block, scenes, state, p, rest, bar);
+    take_from_rest(block, arrays, state, p, x_bar, bar);
     reverse_kernels<T>(table).pull_back(arrays);
-    pull_back_contacts(block, state, p, bar);
+    for (int scene = 0; scene < static_cast<int>(state.contacts.size()); ++scene)
+      for (int i = 0; i < static_cast<int>(block.contacts.size()); ++i)
+        pull_back_contact(block, state, scene, i, p, bar);
     pull_back_pairs(s, block, state, p, bar);
   }
   for (std::size_t i = 0; i < p.size(); ++i) bar.x[sheetbend_blocks::row * (i / 3) + i % 3] = x_bar[i];

@@ -32,7 +32,7 @@ struct ReverseOf<Bounce> {
       if (!has(step.scenes, lane)) continue;
       if (std::ranges::none_of(impacts, [&](const auto& impact) { return impact.lane == lane; })) continue;
       const ContactSource<T> source = contact_source(step, work.masses, lane);
-      const auto poses = source.poses();
+      const auto& poses = (*work.poses)[lane];
       auto poses_bar = no_pose_cotangents(source);
       std::map<int, Flight<Single<T>>> flights;  // cotangents, by node
       for (auto impact = impacts.rbegin(); impact != impacts.rend(); ++impact) {

@@ -9,6 +9,7 @@
 #include "adjoint/step/carry_pair_friction.h"
 #include "adjoint/step/effective_masses.h"
 #include "adjoint/step/keep_spin.h"
+#include "adjoint/step/place_colliders.h"
 #include "adjoint/step/predict.h"
 #include "adjoint/step/project_blocks.h"
 #include "adjoint/step/retract_directors.h"

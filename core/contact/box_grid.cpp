@@ -25,25 +25,26 @@ bool overlap(const Box& a, const Box& b) {  // not where one is nowhere
   return true;
 }
 
+}  // namespace
+
 // As wide as the box in the middle of their order by width, which a few large ones do not move; wider where the boxes would cover too many cells. One that
 // covers more cells than there are boxes counts as often as it is compared.
-double width_of_cells(const std::vector<Box>& boxes) {
-  std::vector<double> widths;
-  widths.reserve(boxes.size());
-  for (const Box& b : boxes) {
+double BoxGrid::width_of_cells() {
+  widths_.clear();
+  for (const Box& b : boxes_) {
     if (!is_finite(b)) continue;
     double widest = 0.0;
     for (int d = 0; d < 3; ++d) widest = std::max(widest, b.high[d] - b.low[d]);
-    widths.push_back(widest);
+    widths_.push_back(widest);
   }
-  if (widths.empty()) return 1.0;
-  const auto middle = widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / 2);
-  std::nth_element(widths.begin(), middle, widths.end());
+  if (widths_.empty()) return 1.0;
+  const auto middle = widths_.begin() + static_cast<std::ptrdiff_t>(widths_.size() / 2);
+  std::nth_element(widths_.begin(), middle, widths_.end());
   double size = std::max(*middle, 1e-300);
-  const double count = static_cast<double>(boxes.size());
+  const double count = static_cast<double>(boxes_.size());
   const auto covered = [&] {
     double sum = 0.0;
-    for (const Box& b : boxes) {
+    for (const Box& b : boxes_) {
       if (!is_finite(b)) continue;
       double cells = 1.0;
       for (int d = 0; d < 3; ++d) cells *= std::floor((b.high[d] - b.low[d]) / size) + 2.0;
@@ -55,11 +56,17 @@ double width_of_cells(const std::vector<Box>& boxes) {
   return size;
 }
 
-}  // namespace
-
-BoxGrid::BoxGrid(std::vector<Box> boxes, bool listed) : boxes_(std::move(boxes)), cell_(width_of_cells(boxes_)) {
+void BoxGrid::take(const std::vector<Box>& boxes) {
+  boxes_ = boxes;
+  cell_ = width_of_cells();
   first_.assign(std::bit_ceil(4 * boxes_.size() + 1), -1);
-  for (int i = 0; listed && i < static_cast<int>(boxes_.size()); ++i) list(i);
+  entries_.clear();
+  wide_.clear();
+}
+
+void BoxGrid::reset(const std::vector<Box>& boxes) {
+  take(boxes);
+  for (int i = 0; i < static_cast<int>(boxes_.size()); ++i) list(i);
 }
 
 template <class Visit>
@@ -119,7 +126,11 @@ const std::vector<int>& BoxGrid::around(const Box& box) {
 
 std::vector<std::pair<int, int>> overlaps(const std::vector<Box>& a, const std::vector<Box>& b, bool itself) {
   std::vector<std::pair<int, int>> found;
-  BoxGrid grid(itself ? a : b, !itself);
+  BoxGrid grid;
+  if (itself)
+    grid.take(a);
+  else
+    grid.reset(b);
   for (int i = 0; i < static_cast<int>(a.size()); ++i) {
     for (const int j : grid.around(a[i])) found.emplace_back(itself ? j : i, itself ? i : j);
     if (itself) grid.list(i);  // so each pair is looked at once

@@ -28,7 +28,7 @@ class RestingContacts {
       if (scene.role[n] == Role::free && scene.inertial[n]) w_[n] = T(1.0) / in.of(Quantity::mass)[n];
     source.emplace(ContactSource<T>{
         scene, in, Bdf::first_order(substep), t0, substep, {held, held, still_.data(), still_.data()}, w_.data(), 0});
-    poses = source->poses();
+    source->find_poses(poses);
     poses.now = poses.next;
     for (int c = 0; c < static_cast<int>(scene.contacts.size()); ++c) {
       const Contact& contact = scene.contacts[c];

@@ -144,7 +144,8 @@ void Rollout<T, List>::advance(std::optional<Scenes> first_order) {
     const Step<T> step{scene_, plan_, in_, bdf_, time(step_ + 1), state(), scenes};
     const auto& masses = record_.template of<ComputeEffectiveMasses>();
     const auto& swept = record_.template of<SweepColors>().contacts;
-    return where_contact_begins(step, masses, x_next_.data(), swept) | where_pairs_begin(scenes) |
+    const auto& poses = record_.template of<PlaceColliders>().scenes;
+    return where_contact_begins(step, masses, poses, x_next_.data(), swept) | where_pairs_begin(scenes) |
            where_held_balls_hit(step, impacts());
   };
   constexpr Scenes all = all_scenes<T>;

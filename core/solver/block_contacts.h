@@ -23,9 +23,8 @@ struct BlockContacts {
   }
 
   template <class T>
-  void load(const ContactSource<T>& source, const DirectBlock& block) {
-    if (block.contacts.empty()) return;
-    poses = source.poses();
+  void load(const ContactSource<T>& source, const ColliderPoses<S>& given, const DirectBlock& block) {
+    poses = given;
     for (std::size_t i = 0; i < numbers.size(); ++i) {
       const BlockContact& c = block.contacts[i];
       numbers[i] = source.numbers(poses, c.contact, c.item);

@@ -20,6 +20,21 @@ namespace sheetbend {
 template <class T>
 using Single = std::conditional_t<std::is_same_v<T, Pack>, double, T>;
 
+template <class T>
+Single<T> in_scene(const T& a, [[maybe_unused]] int scene) {
+  if constexpr (std::is_same_v<T, Pack>)
+    return a[scene];
+  else
+    return a;
+}
+template <class T>
+void add_in_scene(const Single<T>& a, [[maybe_unused]] int scene, T& to) {
+  if constexpr (std::is_same_v<T, Pack>)
+    to.set(scene, to[scene] + a);
+  else
+    to += a;
+}
+
 template <class S>
 struct ColliderPoses {
   std::vector<Pose<S>> next, now, before;  // per collider, at n+1, n and n-1 (empty where it is not asked for)
@@ -36,12 +51,7 @@ struct ContactSource {
   const T* w;  // effective inverse masses, per node
   int lane;    // of a pack
 
-  S read(const T& a) const {
-    if constexpr (std::is_same_v<T, Pack>)
-      return a[lane];
-    else
-      return a;
-  }
+  S read(const T& a) const { return in_scene(a, lane); }
   Vec3<S> read(const Vec3<T>& a) const { return {read(a.x), read(a.y), read(a.z)}; }
   Vec3<S> at(const T* state, int node) const { return read(Vec3<T>(state + scene.first_dof[node])); }
 
@@ -51,12 +61,7 @@ struct ContactSource {
     else
       v.store(to);
   }
-  void add(const S& a, T& to) const {
-    if constexpr (std::is_same_v<T, Pack>)
-      to.set(lane, to[lane] + a);
-    else
-      to += a;
-  }
+  void add(const S& a, T& to) const { add_in_scene(a, lane, to); }
   void add(const Vec3<S>& v, T* to) const { add(v.x, to[0]), add(v.y, to[1]), add(v.z, to[2]); }
 
   // A point of a contact, of coordinates or of velocities; at(node) are its nodes'.
@@ -85,8 +90,7 @@ struct ContactSource {
     return read(at_knots(c.motion.at(t), in.of(Quantity::collider_pose) + c.first_pose, 2, slot));
   }
 
-  ColliderPoses<S> poses() const {
-    ColliderPoses<S> all;
+  void find_poses(ColliderPoses<S>& all) const {
     const auto find = [&](double t, std::vector<Pose<S>>& to) {
       to.resize(scene.colliders.size());
       for (std::size_t c = 0; c < to.size(); ++c) {
@@ -96,33 +100,40 @@ struct ContactSource {
     };
     find(t_next, all.next);
     find(t_next - h, all.now);
+    all.before.clear();
     if (bdf.before != 0.0) find(t_next - 2.0 * h, all.before);
-    return all;
   }
 
-  // The stiffness of a rigid contact is rigidity m/h^2 in either formula, so that what rests is as deep in both.
+  // Those of a contact's numbers that all of its points share. A rigid contact has kappa w in the place of kappa: its stiffness is rigidity m/h^2 in either
+  // formula, so that what rests is as deep in both.
+  ContactNumbers<S> shared_numbers(int contact) const {
+    const Contact& c = scene.contacts[contact];
+    const double share = bdf.eta / h;
+    ContactNumbers<S> numbers{};
+    numbers.friction = read(in.of(Quantity::friction)[contact]);
+    numbers.radius = read(in.of(Quantity::contact_radius)[contact]);
+    numbers.kappa = c.stiffness < 0 ? S(rigidity * share * share)
+                                    : S(bdf.eta * bdf.eta) * read(in.of(Quantity::contact_stiffness)[c.stiffness]);
+    numbers.dissipates = c.dissipation >= 0;
+    if (numbers.dissipates) numbers.loss = read(in.of(Quantity::contact_dissipation)[c.dissipation]) / S(bdf.eta);
+    read_size(scene.colliders[c.collider], numbers.size);
+    return numbers;
+  }
+
+  // All that the law reads of a point.
   ContactNumbers<S> numbers(const ColliderPoses<S>& poses, int contact, int item) const {
     const Contact& c = scene.contacts[contact];
-    const Collider& collider = scene.colliders[c.collider];
-    ContactNumbers<S> numbers{};
+    ContactNumbers<S> numbers = shared_numbers(contact);
+    if (c.stiffness < 0) numbers.kappa = numbers.kappa / inverse_mass(c, item);
     numbers.from = S(bdf.now) * poses.now[c.collider].in_frame(point(c, item, from.x));
     if (bdf.before != 0.0)
       numbers.from = numbers.from + S(bdf.before) * poses.before[c.collider].in_frame(point(c, item, from.x_before));
-    const double share = bdf.eta / h;
-    const S eta2(bdf.eta * bdf.eta);
-    numbers.carried = eta2 * at(from.x, c.carried[item]);
+    numbers.carried = S(bdf.eta * bdf.eta) * at(from.x, c.carried[item]);
     if (c.rebounds(item)) {
       const Rebound<S> r = rebound(poses, contact, item);
-      numbers.carried = eta2 * r.carried;
+      numbers.carried = S(bdf.eta * bdf.eta) * r.carried;
       numbers.lift = r.lift, numbers.leaving = r.leaving, numbers.firm = r.lifts ? firmness : 1.0;
     }
-    numbers.friction = read(in.of(Quantity::friction)[contact]);
-    numbers.radius = read(in.of(Quantity::contact_radius)[contact]);
-    numbers.kappa = c.stiffness < 0 ? S(rigidity * share * share) / inverse_mass(c, item)
-                                    : eta2 * read(in.of(Quantity::contact_stiffness)[c.stiffness]);
-    numbers.dissipates = c.dissipation >= 0;
-    if (numbers.dissipates) numbers.loss = read(in.of(Quantity::contact_dissipation)[c.dissipation]) / S(bdf.eta);
-    read_size(collider, numbers.size);
     return numbers;
   }
 

@@ -1,17 +1,6 @@
 #include "core/solver/packed_contacts.h"
 
 #include <algorithm>
-#include <stdexcept>
-#include <string>
-
-#define SHEETBEND_DECLARE(variant) extern "C" const sheetbend_contacts::Table sheetbend_contacts_##variant;
-SHEETBEND_DECLARE(portable)
-#ifdef SHEETBEND_KERNELS_V3
-SHEETBEND_DECLARE(v3)
-#endif
-#ifdef SHEETBEND_KERNELS_V4
-SHEETBEND_DECLARE(v4)
-#endif
 
 namespace sheetbend {
 namespace {
@@ -61,25 +50,6 @@ sheetbend_contacts::Pass PackedContacts::pass(int iteration, const sheetbend_con
   p.push_before = own(iteration - 1);
   p.pushes_before = pushing_.data() + place(iteration - 1);
   return p;
-}
-
-const sheetbend_contacts::Table& contact_kernels_of(std::string_view instruction_set) {
-  static constexpr const sheetbend_contacts::Table* tables[] = {
-#ifdef SHEETBEND_KERNELS_V4
-      &sheetbend_contacts_v4,
-#endif
-#ifdef SHEETBEND_KERNELS_V3
-      &sheetbend_contacts_v3,
-#endif
-      &sheetbend_contacts_portable};
-  for (const auto* table : tables)
-    if (instruction_set == table->name) return *table;
-  throw std::logic_error("packed_contacts.cpp lists no contact kernels of " + std::string(instruction_set));
-}
-
-const sheetbend_contacts::Table& contact_kernels() {
-  static const sheetbend_contacts::Table& chosen = contact_kernels_of(pack_kernels().name);
-  return chosen;
 }
 
 const sheetbend_contacts::Kernels& contact_kernels(const Scene& scene, const SweptGroup& group) {

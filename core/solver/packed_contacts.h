@@ -2,10 +2,10 @@
 // scenes go one after the other, each as it would alone.
 #pragma once
 
-#include <string_view>
+#include <algorithm>
 #include <vector>
 
-#include "core/contact/kernels.h"
+#include "core/packs/contact_tables.h"
 #include "core/scalar/numbers.h"
 #include "core/solver/contact_source.h"
 #include "core/solver/plan.h"
@@ -55,29 +55,20 @@ template <class T>
 void PackedContacts::begin(const ContactSource<T>& source, const SweptGroup& group,
                            const ColliderPoses<double>& poses) {
   const Contact& c = source.scene.contacts[group.contact];
-  const double share = source.bdf.eta / source.h;
+  const ContactNumbers<double> shared = source.shared_numbers(group.contact);
   contacts_.now = source.bdf.now, contacts_.before = source.bdf.before;
   contacts_.eta2 = source.bdf.eta * source.bdf.eta;
-  contacts_.friction = source.read(source.in.of(Quantity::friction)[group.contact]);
-  contacts_.radius = source.read(source.in.of(Quantity::contact_radius)[group.contact]);
-  contacts_.dissipates = c.dissipation >= 0;
-  if (contacts_.dissipates)
-    contacts_.loss = source.read(source.in.of(Quantity::contact_dissipation)[c.dissipation]) / source.bdf.eta;
+  contacts_.friction = shared.friction, contacts_.radius = shared.radius, contacts_.kappa = shared.kappa;
+  contacts_.loss = shared.loss, contacts_.dissipates = shared.dissipates;
   contacts_.soft = c.stiffness >= 0;
-  contacts_.kappa = contacts_.soft
-                        ? contacts_.eta2 * source.read(source.in.of(Quantity::contact_stiffness)[c.stiffness])
-                        : rigidity * share * share;
-  source.read_size(source.scene.colliders[c.collider], contacts_.size);
+  std::copy_n(shared.size, most_sizes, contacts_.size);
   contacts_.x = scene_points(source.from.x, 3, source.lane);
   contacts_.x_before = scene_points(source.from.x_before, 3, source.lane);
   contacts_.w = scene_points(source.w, 1, source.lane);
   begin(group, poses, c.collider);
 }
 
-// The kernels of an instruction set by its name, which throws std::logic_error where there are none; those of this machine, of the instruction set of
-// pack_kernels(); and those of a group's shape.
-const sheetbend_contacts::Table& contact_kernels_of(std::string_view instruction_set);
-const sheetbend_contacts::Table& contact_kernels();
+// Those of a group's shape.
 const sheetbend_contacts::Kernels& contact_kernels(const Scene& scene, const SweptGroup& group);
 
 }  // namespace sheetbend

@@ -192,11 +192,12 @@ void begin_block(const SubstepState<T>& s, const DirectBlock& block, BlockState<
     for (int row = 0; row < block.size(); ++row) state.C_r[row] = s.C_r[block.multipliers[row]];
 }
 
-// What contacts read of a substep; source_of(lane) says where it comes from for a scene of a pack.
+// What contacts read of a substep; source_of(lane) says where it comes from for a scene of a pack, whose colliders have these poses.
 template <class T, class F>
-void load_contacts(const DirectBlock& block, F&& source_of, BlockState<T>& state) {
+void load_contacts(const DirectBlock& block, F&& source_of, const std::vector<ColliderPoses<Single<T>>>& poses,
+                   BlockState<T>& state) {
   for (int scene = 0; scene < static_cast<int>(state.contacts.size()); ++scene) {
-    state.contacts[scene].load(source_of(scene), block);
+    if (!block.contacts.empty()) state.contacts[scene].load(source_of(scene), poses[scene], block);
     state.friction[scene].load(source_of(scene), block);
   }
 }

@@ -38,7 +38,7 @@ struct SweptContacts {
     bool pushes = false;
   };
   ColliderPoses<S> poses;
-  // Of contacts one by one, none where all go in packs. Of those that have not come near, radius and size.
+  // Of contacts one by one, none where all go in packs. Those that have not come near have what all points share.
   std::vector<ContactNumbers<S>> numbers;
   // Likewise: whether all its numbers are at hand, because a pass found it below the surface, or it rebounds.
   std::vector<char> near;
@@ -74,8 +74,8 @@ struct SweptContacts {
 
   // What a substep begins with. Where nothing touches, all that is asked for is gaps.
   template <class T>
-  void begin(const ContactSource<T>& source, const Plan& plan) {
-    poses = source.poses();
+  void begin(const ContactSource<T>& source, const ColliderPoses<S>& given, const Plan& plan) {
+    poses = given;
     for (std::size_t g = 0; g < packed.size(); ++g) {
       const SweptGroup& group = plan.contact_groups[g];
       if constexpr (std::is_same_v<S, double>)
@@ -83,15 +83,11 @@ struct SweptContacts {
           packed[g].begin(source, group, poses);
           continue;
         }
+      const ContactNumbers<S> shared = source.shared_numbers(group.contact);
       for (int i = group.first; i < group.first + group.count; ++i) {
         const SweptContact& c = plan.contacts[i];
         near[i] = source.scene.contacts[c.contact].rebounds(c.item);
-        if (near[i]) {
-          numbers[i] = source.numbers(poses, c.contact, c.item);
-          continue;
-        }
-        numbers[i].radius = source.read(source.in.of(Quantity::contact_radius)[c.contact]);
-        source.read_size(source.scene.colliders[c.collider], numbers[i].size);
+        numbers[i] = near[i] ? source.numbers(poses, c.contact, c.item) : shared;
       }
     }
   }

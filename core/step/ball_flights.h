@@ -3,8 +3,9 @@
 // of which nothing is differentiated.
 #pragma once
 
+#include <algorithm>
 #include <functional>
-#include <queue>
+#include <set>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -19,31 +20,19 @@ class BallFlights {
  public:
   using S = Single<T>;
 
-  BallFlights(const ContactSource<T>& source, const ColliderPoses<S>& poses, const Coordinates<T>& q)
-      : source_(source), poses_(poses), balls_(source.scene.balls) {
-    std::vector<Box> ways;
-    for (const Bouncer& own : balls_.members) {
-      const int ball = static_cast<int>(flying_.size());
-      const Flight<S> f = flight_of(source, own.node, source.read(Vec3<T>(q.of(own.node))));
-      flying_.push_back({ball_of(source, ball, f), {}, own.contacts, 0, -1});
-      take_values(flying_.back());
-      ways.push_back(way_of(flying_.back().values));
-    }
-    ways_ = BoxGrid(std::move(ways));
-    for (const int contact : contacts_of_balls())
-      surfaces_.emplace_back(contact, as_values(source.surface(poses, contact)));
-  }
-
-  // Lets them fly to the end of the substep, and adds their impacts.
-  void fly(std::vector<Impact<S>>& impacts) {
+  // Lets them fly to the end of a substep: adds their impacts, and writes where those that have bounced fly to. Memory is kept for the next substep.
+  void fly(const ContactSource<T>& source, const ColliderPoses<S>& poses, const Coordinates<T>& q,
+           std::vector<Impact<S>>& impacts) {
+    begin(source, poses, q);
     for (int i = 0; i < count(); ++i) {
       look_for_surfaces(i);
       for (const int j : ways_.around(way_of(flying_[i].values)))
         if (j > i) look_for_meeting(i, j);
     }
     while (!next_.empty()) {
-      const Event event = next_.top();
-      next_.pop();
+      std::pop_heap(next_.begin(), next_.end(), std::greater<>());
+      const Event event = next_.back();
+      next_.pop_back();
       if (is_over(event)) continue;
       if (event.other < 0 && event.rests) {
         std::erase(flying_[event.one].contacts, event.contact);  // left to the projection
@@ -54,14 +43,8 @@ class BallFlights {
       look_from(event.one, -1);
       if (event.other >= 0) look_from(event.other, event.one);
     }
-  }
-
-  // The nodes that have bounced, and where they fly to.
-  std::vector<std::pair<int, Vec3<S>>> ends() const {
-    std::vector<std::pair<int, Vec3<S>>> all;
     for (int i = 0; i < count(); ++i)
-      if (flying_[i].impacts > 0) all.emplace_back(balls_.members[i].node, flying_[i].ball.flight.x_end);
-    return all;
+      if (flying_[i].impacts > 0) source.write(flying_[i].ball.flight.x_end, q.of(balls().members[i].node));
   }
 
  private:
@@ -86,7 +69,26 @@ class BallFlights {
     }
   };
 
+  const Balls& balls() const { return source_->scene.balls; }
   int count() const { return static_cast<int>(flying_.size()); }
+
+  void begin(const ContactSource<T>& source, const ColliderPoses<S>& poses, const Coordinates<T>& q) {
+    source_ = &source, poses_ = &poses;
+    boxes_.clear(), next_.clear();
+    if (flying_.empty()) find_surfaces();
+    flying_.resize(balls().members.size());
+    for (int ball = 0; ball < count(); ++ball) {
+      const Bouncer& own = balls().members[ball];
+      Flying& f = flying_[ball];
+      f.ball = ball_of(source, ball, flight_of(source, own.node, source.read(Vec3<T>(q.of(own.node)))));
+      f.contacts = own.contacts;
+      f.impacts = 0, f.rests_with = -1;
+      take_values(f);
+      boxes_.push_back(way_of(f.values));
+    }
+    ways_.reset(boxes_);
+    for (auto& [contact, surface] : surfaces_) surface = as_values(source.surface(poses, contact));
+  }
 
   static void take_values(Flying& f) {
     f.values = {as_values(f.ball.flight), value_of(f.ball.radius), value_of(f.ball.mass)};
@@ -105,7 +107,8 @@ class BallFlights {
   void add(Event event) {
     event.impacts_of_one = flying_[event.one].impacts;
     if (event.other >= 0) event.impacts_of_other = flying_[event.other].impacts;
-    next_.push(event);
+    next_.push_back(event);
+    std::push_heap(next_.begin(), next_.end(), std::greater<>());
   }
 
   // Whether one of both has flown elsewhere since.
@@ -128,15 +131,15 @@ class BallFlights {
     const Flight<double>& path = f.values.flight;
     Event event{0.0, i, -1, -1, 0.0, true, false};
     for (const int contact : f.contacts) {
-      const ImpactRule own = rule_of(source_, contact);
+      const ImpactRule own = rule_of(*source_, contact);
       const Surface<double>& surface = surface_of(contact);
       if (!meets(own, path, surface)) continue;
       const double time = time_of_impact(own, path, surface, 0.0, path.left);
       if (event.contact < 0 || time < event.time) event.contact = contact, event.time = time;
     }
     if (event.contact < 0) return;
-    event.when = source_.h - path.left + event.time;
-    event.rests = !bounces(rule_of(source_, event.contact), path, surface_of(event.contact), event.time);
+    event.when = source_->h - path.left + event.time;
+    event.rests = !bounces(rule_of(*source_, event.contact), path, surface_of(event.contact), event.time);
     add(event);
   }
 
@@ -144,10 +147,10 @@ class BallFlights {
     const Flying &one = flying_[i], &other = flying_[j];
     if (one.impacts >= most_impacts || other.impacts >= most_impacts) return;
     if (one.rests_with == j) return;
-    const double e = value_of(source_.read(source_.in.of(Quantity::restitution)[balls_.restitution]));
-    const auto found = meeting_of(rule_of_balls(source_), {one.values, other.values, e});
+    const double e = value_of(source_->read(source_->in.of(Quantity::restitution)[balls().restitution]));
+    const auto found = meeting_of(rule_of_balls(*source_), {one.values, other.values, e});
     if (!found) return;
-    const double from = source_.h - std::min(one.values.flight.left, other.values.flight.left);
+    const double from = source_->h - std::min(one.values.flight.left, other.values.flight.left);
     add({from + found->time, i, j, -1, found->time, found->dated, found->rests});
   }
 
@@ -155,19 +158,19 @@ class BallFlights {
     Flying& f = flying_[event.one];
     const Flight<S> before = f.ball.flight;
     f.ball.flight =
-        bounced(rule_of(source_, event.contact), before, source_.surface(poses_, event.contact), event.time);
-    return {source_.lane, event.contact, {event.time, true, false}, {flown(event.one, before)}};
+        bounced(rule_of(*source_, event.contact), before, source_->surface(*poses_, event.contact), event.time);
+    return {source_->lane, event.contact, {event.time, true, false}, {flown(event.one, before)}};
   }
 
   Impact<S> hit(const Event& event) {
     Flying &one = flying_[event.one], &other = flying_[event.other];
     const BallMeeting meeting{event.time, event.dated, event.rests};
-    const BallPair<S> before = pair_of(source_, one.ball, other.ball);
-    const auto after = collided(rule_of_balls(source_), before, meeting);
+    const BallPair<S> before = pair_of(*source_, one.ball, other.ball);
+    const auto after = collided(rule_of_balls(*source_), before, meeting);
     one.ball.flight = after[0], other.ball.flight = after[1];
     const Flown<S> first = flown(event.one, before.one.flight), second = flown(event.other, before.other.flight);
     if (event.rests) one.rests_with = event.other, other.rests_with = event.one;
-    return {source_.lane, -1, meeting, {first, second}};
+    return {source_->lane, -1, meeting, {first, second}};
   }
 
   Flown<S> flown(int i, const Flight<S>& before) {
@@ -177,27 +180,26 @@ class BallFlights {
     f.rests_with = -1;
     take_values(f);
     ways_.move(i, way_of(f.values));
-    return {balls_.members[i].node, i, before, f.ball.flight};
+    return {balls().members[i].node, i, before, f.ball.flight};
   }
 
-  std::vector<int> contacts_of_balls() const {
-    std::vector<int> all;
-    for (const Bouncer& own : balls_.members) all.insert(all.end(), own.contacts.begin(), own.contacts.end());
-    std::sort(all.begin(), all.end());
-    all.erase(std::unique(all.begin(), all.end()), all.end());
-    return all;
+  // Which contacts they may bounce off.
+  void find_surfaces() {
+    std::set<int> all;
+    for (const Bouncer& own : balls().members) all.insert(own.contacts.begin(), own.contacts.end());
+    for (const int contact : all) surfaces_.emplace_back(contact, Surface<double>());
   }
   const Surface<double>& surface_of(int contact) const {
     return std::find_if(surfaces_.begin(), surfaces_.end(), [&](const auto& s) { return s.first == contact; })->second;
   }
 
-  const ContactSource<T>& source_;
-  const ColliderPoses<S>& poses_;
-  const Balls& balls_;
+  const ContactSource<T>* source_ = nullptr;  // of the substep, as the next
+  const ColliderPoses<S>* poses_ = nullptr;
   std::vector<Flying> flying_;
   std::vector<std::pair<int, Surface<double>>> surfaces_;
+  std::vector<Box> boxes_;
   BoxGrid ways_;
-  std::priority_queue<Event, std::vector<Event>, std::greater<>> next_;  // some of which are over
+  std::vector<Event> next_;  // a heap, the earliest first; some of which are over
 };
 
 }  // namespace sheetbend

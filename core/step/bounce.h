@@ -15,6 +15,8 @@ struct Bounce {
   template <class T>
   struct Record {
     std::vector<Impact<Single<T>>> impacts;  // of each particle in the order in which they happened
+    BallFlights<T> balls;                    // keep their memory, as the next one does
+    std::vector<int> left;                   // contacts that a particle may still bounce off
 
     void resize(const Scene&, const Plan&, bool) {}
     static std::size_t bytes(const Scene&, const Plan&, bool) { return 0; }
@@ -28,12 +30,10 @@ struct Bounce {
     for (int lane = 0; lane < scenes_of<T>; ++lane) {
       if (!has(step.scenes, lane)) continue;
       const ContactSource<T> source = contact_source(step, work.masses, lane);
-      const auto poses = source.poses();
+      const auto& poses = (*work.poses)[lane];
       for (const Bouncer& bouncer : scene.bouncers) fly(source, poses, bouncer, work, record);
       if (scene.balls.empty()) continue;
-      BallFlights<T> balls(source, poses, work.q);
-      balls.fly(record.impacts);
-      for (const auto& [node, end] : balls.ends()) source.write(end, work.q.of(node));
+      record.balls.fly(source, poses, work.q, record.impacts);
     }
     work.impacts = &record.impacts;
   }
@@ -45,7 +45,8 @@ struct Bounce {
     using S = Single<T>;
     const int node = bouncer.node;
     Flight<S> f = flight_of(source, node, source.read(Vec3<T>(work.q.of(node))));
-    std::vector<int> left = bouncer.contacts;
+    std::vector<int>& left = record.left;
+    left = bouncer.contacts;
     for (int turn = 0; turn < most_impacts; ++turn) {
       const Flight<double> path = as_values(f);
       int first = -1;

@@ -9,7 +9,8 @@ namespace sheetbend {
 
 // Calls f(source, poses, contact, item) for every contact of a movable point, one of the step's scenes after the other; not for those that go in packs.
 template <class T, class F>
-void for_each_contact(const Step<T>& step, const InverseMasses<T>& masses, F&& f) {
+void for_each_contact(const Step<T>& step, const InverseMasses<T>& masses,
+                      const std::vector<ColliderPoses<Single<T>>>& poses, F&& f) {
   const auto in_packs = [&](int c) {
     return std::ranges::any_of(step.plan.contact_groups, [&](const SweptGroup& group) {
       return group.contact == c && goes_in_packs<Single<T>>(group);
@@ -19,11 +20,10 @@ void for_each_contact(const Step<T>& step, const InverseMasses<T>& masses, F&& f
   for (int lane = 0; lane < scenes_of<T>; ++lane) {
     if (!has(step.scenes, lane)) continue;
     const ContactSource<T> source = contact_source(step, masses, lane);
-    const auto poses = source.poses();
     for (int c = 0; c < static_cast<int>(step.scene.contacts.size()); ++c) {
       if (in_packs(c)) continue;
       for (int i = 0; i < step.scene.contacts[c].points(); ++i)
-        if (moves(step.scene, step.scene.contacts[c], i)) f(source, poses, c, i);
+        if (moves(step.scene, step.scene.contacts[c], i)) f(source, poses[lane], c, i);
     }
   }
 }
@@ -61,7 +61,7 @@ struct CarryFriction {
     const Scene& scene = step.scene;
     const double rate = 1.0 / (step.bdf.eta * step.bdf.eta);
     const std::size_t count = points_in_contact(scene);
-    for_each_contact(step, work.masses, [&](const auto& source, const auto& poses, int c, int i) {
+    for_each_contact(step, work.masses, *work.poses, [&](const auto& source, const auto& poses, int c, int i) {
       using S = Single<T>;
       const Contact& contact = scene.contacts[c];
       const auto x = source.point(contact, i, work.x_next);

@@ -11,11 +11,12 @@ namespace sheetbend {
 inline constexpr double followed = 0.5;
 
 template <class T>
-Scenes where_contact_begins(const Step<T>& step, const InverseMasses<T>& masses, const T* x_next,
+Scenes where_contact_begins(const Step<T>& step, const InverseMasses<T>& masses,
+                            const std::vector<ColliderPoses<Single<T>>>& colliders, const T* x_next,
                             const std::vector<SweptContacts<Single<T>>>& swept) {
   const Scene& scene = step.scene;
   Scenes begun = 0;
-  for (int lane = 0; lane < scenes_of<T>; ++lane) {
+  for (int lane = 0; lane < static_cast<int>(colliders.size()); ++lane) {
     if (!has(step.scenes, lane)) continue;
     const auto source = contact_source(step, masses, lane);
     const auto is_followed = [&](const Contact& c, int item) {
@@ -23,7 +24,7 @@ Scenes where_contact_begins(const Step<T>& step, const InverseMasses<T>& masses,
       const double stiffness = value_of(source.read(step.in.of(Quantity::contact_stiffness)[c.stiffness]));
       return stiffness * value_of(source.inverse_mass(c, item)) * source.h * source.h <= followed * followed;
     };
-    const auto poses = source.poses();
+    const auto& poses = colliders[lane];
     const auto begins = [&](const Contact& c, int contact, int item) {
       double above = 0.0;
       if (c.rebounds(item))

@@ -64,7 +64,8 @@ void ProjectBlocks::forward(const Step<T>& step, Work<T>& work, Record<T>& recor
       const DirectBlock& block = plan.blocks[b];
       begin_block(state, block, record.blocks[b]);
       damping_references(state, block, pack_kernels(), step.bdf.before, step.from, record.blocks[b]);
-      load_contacts(block, [&](int lane) { return contact_source(step, work.masses, lane); }, record.blocks[b]);
+      load_contacts(
+          block, [&](int lane) { return contact_source(step, work.masses, lane); }, *work.poses, record.blocks[b]);
       if (block.implicit)
         project_implicit(state, block, plan.options, step.from, step.scenes, pack_kernels(), record.blocks[b]);
       else

@@ -75,8 +75,9 @@ struct Work {
   T *x_next, *v_next;        // (dofs); the repetition for a reverse has no v_next
   bool finite = true;        // whether all of x_next is
   T* multipliers = nullptr;  // of the substep, where a later stage reads them
-  const std::vector<Impact<Single<T>>>* impacts = nullptr;  // of each particle in order; none where it is null
-  std::vector<SweptContacts<Single<T>>>* swept = nullptr;   // per scene; none where no contacts go by sweeps
+  const std::vector<Impact<Single<T>>>* impacts = nullptr;       // of each particle in order; none where it is null
+  const std::vector<ColliderPoses<Single<T>>>* poses = nullptr;  // per scene; none where no stage asks
+  std::vector<SweptContacts<Single<T>>>* swept = nullptr;        // per scene; none where no contacts go by sweeps
 };
 
 // What the contacts of a scene of T read of a substep.

@@ -10,6 +10,7 @@
 #include "core/step/carry_pair_friction.h"
 #include "core/step/effective_masses.h"
 #include "core/step/keep_spin.h"
+#include "core/step/place_colliders.h"
 #include "core/step/predict.h"
 #include "core/step/project_blocks.h"
 #include "core/step/retract_directors.h"
@@ -24,6 +25,7 @@ using Substep = Stages<ComputeEffectiveMasses,  // w = 1/(m + eta c), c the impl
                        ApplyForces,             // x* += eta^2 w f(t)
                        ApplyLoads,              // x* += w eta^2 tau(t) J^T of rows that are loaded
                        ApplyAirForces,          // x* += eta^2 w f of the wind and the pressure on triangles
+                       PlaceColliders,          // poses at n+1, n and n-1, which the next ones read
                        Bounce,                  // what meets a collider with restitution goes on from there
                        ProjectBlocks,           // direct blocks: x <- x + W J^T dlambda, or until their forces balance
                        SweepColors,             // the same for one constraint after the other, and for kept volumes
@@ -44,6 +46,7 @@ template <class T, class List>
 Work<T> work_of(const Plan& plan, Records<T, List>& record, T* x_next, T* v_next) {
   Work<T> work{record.template of<ComputeEffectiveMasses>(),
                record.template of<SweepColors>().coordinates(plan, x_next), x_next, v_next};
+  work.poses = &record.template of<PlaceColliders>().scenes;
   work.swept = &record.template of<SweepColors>().contacts;
   if (auto& own = record.template of<KeepSpin>().multipliers; !own.empty()) work.multipliers = own.data();
   return work;

@@ -153,8 +153,9 @@ void SweepColors::forward(const Step<T>& step, Work<T>& work, Record<T>& record)
   const bool swept = !step.plan.colors.empty();
   T* q = work.x_next;
   if (swept) begin(step, work, q, record);
-  for_each_scene(step, work.masses, record.contacts,
-                 [&](const auto& source, auto& contacts) { contacts.begin(source, step.plan); });
+  for_each_scene(step, work.masses, record.contacts, [&](const auto& source, auto& contacts) {
+    contacts.begin(source, (*work.poses)[source.lane], step.plan);
+  });
   record.with_coordinates(step.plan, q, [&](auto at) {
     for (int iteration = 0; iteration < step.plan.options.iterations; ++iteration) {
       sweep(step, work, iteration, q, record);

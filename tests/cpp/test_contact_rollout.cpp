@@ -199,6 +199,7 @@ Modes modes_of(const Program& p, const std::vector<double>& inputs) {
   one_by_one.contact_groups.clear();  // packs are looked at in the same way
   InverseMasses<double> masses;
   masses.resize(p.scene, p.plan, false);
+  std::vector<ColliderPoses<double>> colliders(1);
   std::map<std::pair<int, int>, bool> touching;
   Modes modes;
   std::vector<double> x, x_before;
@@ -209,7 +210,8 @@ Modes modes_of(const Program& p, const std::vector<double>& inputs) {
     const Step<double> step{p.scene,       one_by_one,          {p.scene.layout, inputs.data()},
                             rollout.bdf(), rollout.time(n + 1), {x.data(), x_before.data(), x.data(), x.data(), n}};
     ComputeEffectiveMasses::compute(step, masses);
-    for_each_contact(step, masses, [&](const auto& source, const auto& poses, int c, int i) {
+    contact_source(step, masses, 0).find_poses(colliders[0]);
+    for_each_contact(step, masses, colliders, [&](const auto& source, const auto& poses, int c, int i) {
       const Contact& contact = p.scene.contacts[c];
       const auto z = poses.next[contact.collider].in_frame(source.point(contact, i, rollout.x()));
       const auto numbers = source.numbers(poses, c, i);

@@ -163,8 +163,8 @@ struct ReverseOf<CarryInLayer> {
 };
 
 using LongerSubstep = Stages<ComputeEffectiveMasses, Predict, ApplyForces, ApplyLoads, PushAlongX, HoldInLayer,
-                             ApplyAirForces, Bounce, ProjectBlocks, SweepColors, UpdateVelocities, LeaveImpacts,
-                             KeepSpin, RetractDirectors, Yield, CarryFriction, CarryInLayer>;
+                             ApplyAirForces, PlaceColliders, Bounce, ProjectBlocks, SweepColors, UpdateVelocities,
+                             LeaveImpacts, KeepSpin, RetractDirectors, Yield, CarryFriction, CarryInLayer>;
 
 }  // namespace sheetbend
 

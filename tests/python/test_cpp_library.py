@@ -442,6 +442,30 @@ def test_no_method_allocates_in_a_step(
     assert allocations(*command, 5, f"method={method}") == allocations(*command, 50, f"method={method}") > 100
 
 
+def lying() -> sb.Scene:
+    """A rope that falls on a table and slides there."""
+    scene = sb.rope(0.3, 12, density=0.05, EI=1e-3, EA=50.0, bend_damping=3e-3, pinned=(0,), direction=(1, 0, -0.2))
+    scene.add_contact(scene.ropes["rope"], sb.Plane(point=(0, 0, -0.07), name="table"), friction=0.3, radius=2e-3)
+    return scene
+
+
+def bouncing() -> sb.Scene:
+    """Balls that hit each other over a table."""
+    scene, rng = sb.Scene(), np.random.default_rng(0)
+    places = 0.15 * np.stack(np.meshgrid(*3 * [range(3)]), -1).reshape(-1, 3) + [0, 0, 0.3]
+    balls = scene.add_particles(places + rng.normal(scale=0.01, size=places.shape), 0.1)
+    scene.add_contact(balls, sb.Plane(name="table"), friction=0.1, restitution=0.8, radius=0.05)
+    scene.add_collisions(balls, radius=0.05, restitution=0.8)
+    return scene
+
+
+@pytest.mark.parametrize(("make", "method"), [(lying, "gauss_seidel"), (lying, "implicit"), (bouncing, "gauss_seidel")])
+def test_contacts_keep_their_memory(programs: Path, tmp_path: Path, make: Callable[[], sb.Scene], method: str) -> None:
+    """Once their lists are as long as they get."""
+    command, solver = [programs / "counted_loop", saved(make(), tmp_path)], f"method={method}"
+    assert allocations(*command, 300, solver) == allocations(*command, 400, solver) > 100
+
+
 # Residuals.
 
 
