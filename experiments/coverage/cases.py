@@ -8,6 +8,7 @@ from functools import cache
 
 import chaotic_cases as chaotic
 import contact_cases as contact
+import middle_cases as middle
 import numpy as np
 import population_cases as many
 import sheetbend as sb
@@ -183,6 +184,7 @@ CASES: Mapping[str, Case] = {
     "pull": Case("pulls of five specimens, white noise", PULL, pull),
     "population": Case("50 ropes with a spread of 10 %", many.TRUTH, many.fit_population, least=180, most=200),
     "chaotic": Case("a double pendulum over 20 s, shot", chaotic.TRUTH, chaotic.fit, least=180, most=200),
+    "middle": Case("a rope of 40 links from the middle of its motion", middle.TRUTH, middle.fit, least=180, most=200),
     "contact_drag": Case(
         "rope dragged over a table", contact.DRAG, contact.twin(contact.drag, contact.DRAG), least=180, most=200
     ),
