@@ -9,19 +9,18 @@ import numpy as np
 
 from ..arrays.timeseries import Array
 from ..minimum.problem import FitProblem
-from ..scene.air import WIND
 from .tangents import Input
 
 
 def drafts(problem: FitProblem, u: Array, i: int) -> tuple[FitProblem, list[Input]]:
     """The problem at u (free,), with a wind of zero in the i-th experiment, and what 1 m/s along each axis adds to it.
-    None is added where nothing that moves freely has drag, and where the scene has a wind already.
+    None is added where nothing has drag, and where the scene has a wind already.
 
     Raises:
         SheetbendError: the motion has no answer there.
     """
     e = problem.experiment_at(i, u)
-    if e.static or not e.scene.has_drag or any(name.startswith(WIND) for name in e.scene.quantities):
+    if e.static or not e.scene.has_drag or any(t.array == "wind" for t in e.scene.terms):
         return problem, []
     scene = e.scene.shallow()
     scene.air = copy.copy(scene.air)

@@ -253,7 +253,7 @@ def _observe(
             yield change(f"clamps along {way}", "clamps", moved)
         arm = shown - start[held].mean(axis=0)
         yield change(LARGER, "recording_size", arm, relative=True)
-        if not len(e.scene.air.triangles) and not len(e.scene.forces.particles):  # which would have to turn as well
+        if not len(e.scene.air.times) and not len(e.scene.forces.particles):  # which would have to turn as well
             yield from _turned_clamps(e, arm, change, by_gravity)
 
 
