@@ -74,6 +74,23 @@ def test_nothing_feels_a_draft_without_drag_or_beside_a_wind() -> None:
     assert drafts_of(problem_of(scene, np.zeros((31, 7, 3)))) == []
 
 
+@pytest.mark.parametrize("knots", [3, 60])
+def test_a_wind_over_time_is_told_as_it_is(knots: int) -> None:
+    """Of many knots there is one quantity, `wind_strength`, whose change moves markers as it does in a simulation."""
+
+    def blown(strength: float) -> FitProblem:
+        scene, t = thrown(np.zeros(3), drag_linear=0.03), np.linspace(0.0, 0.3, knots)
+        scene.set_wind(strength * np.column_stack([np.cos(9 * t), np.sin(7 * t), t]), t)
+        return problem_of(scene, np.zeros((31, 7, 3)))
+
+    u = blown(1.0).parameters.initial()
+    told, why = told_numbers(blown(1.0), u)
+    assert not why and not any(one.name in ("draft", "clamp_direction") for one in told)
+    (found,) = (one for one in told if one.name == "wind_strength")
+    ends = [blown(1.0 + d).evaluate(u, jacobian=False)[1] for d in (1e-4, -1e-4)]
+    assert found.column == pytest.approx((ends[0] - ends[1]) / 2e-4, rel=1e-5, abs=1e-6)
+
+
 def test_drag_rests_on_still_air_as_much_as_a_fit_to_moving_air_says() -> None:
     def found(wind: float) -> tuple[FitProblem, np.ndarray]:
         blown = np.array([0.0, 0.0, wind])

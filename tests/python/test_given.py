@@ -128,6 +128,9 @@ def test_turned_clamps_move_what_a_refit_moves(clean: sb.Recording) -> None:
     for parameter in FITTED:
         moved = (ends[0][parameter] - ends[1][parameter]) / 0.2
         assert found.moved[parameter] == pytest.approx(moved, rel=0.01), parameter
+    windy = hanging()
+    windy.set_wind((0.1, 0.0, 0.0))  # which would have to turn as well
+    assert not any(p.name.startswith("clamps about") for p in fit(windy, clean).result.premises)
 
 
 def test_a_table_that_turns_moves_what_a_refit_moves() -> None:

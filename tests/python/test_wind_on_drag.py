@@ -144,6 +144,13 @@ def test_an_unknown_wind_along_a_rope_is_found() -> None:
     assert fit["rope_EI"].lower < 1e-3 < fit["rope_EI"].upper
 
 
+def test_a_wind_that_blows_on_nothing_is_refused() -> None:
+    scene = hanging()
+    scene.set_wind(WIND)
+    with pytest.raises(sb.SceneError, match="wind: blows on nothing"):
+        sb.simulate(scene, TIMES, sb.Solver(h=1 / 240))
+
+
 CONFIG = """
 [experiment]
 name = "rope"

@@ -99,9 +99,7 @@ class Air:
         Raises:
             SceneError: nothing is in air or has drag, or it changes already.
         """
-        if not len(self.triangles) and not scene.has_drag:
-            fix = "give something drag (drag_linear of a rope), or call Scene.add_air first (air_normal of a cloth)"
-            raise SceneError("wind", "blows on nothing", None, fix)
+        self.expect_blown(scene.has_drag)
         if self._blowing is None:
             self.blow(scene, None)
         if len(self.times) > 1:
@@ -112,6 +110,16 @@ class Air:
             if t.array == "wind":
                 scene.terms[i] = replace(t, index=np.ravel(t.index) + knots)
         self.times, self.wind = times, np.zeros((len(times), 3))
+
+    def expect_blown(self, has_drag: bool) -> None:
+        """Refuse a wind that has no effect.
+
+        Raises:
+            SceneError: nothing is in air or has drag.
+        """
+        if not len(self.triangles) and not has_drag:
+            fix = "give something drag (drag_linear of a rope), or call Scene.add_air first (air_normal of a cloth)"
+            raise SceneError("wind", "blows on nothing", None, fix)
 
     def blow_in(self, scene: Builder, shapes: Array, names: Sequence[Sequence[str]]) -> None:
         """Add to the wind quantities, three for each mode, times its shape (knots, modes) over the knots.

@@ -55,7 +55,8 @@ class BlownScene(CollidingScene):
             times: (knots,) s, increasing; the wind is linear between and constant outside.
 
         Raises:
-            SceneError: shapes, NaN, times that do not increase, or another wind than an earlier call's.
+            SceneError: shapes, NaN, times that do not increase, or another wind than an earlier call's; when the scene
+                is compiled: a wind that blows on nothing.
         """
         self._building()
         self.air.blow(self, wind, times)
