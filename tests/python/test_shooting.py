@@ -373,8 +373,10 @@ def test_ctrl_c_while_windows_get_their_first_states_keeps_those_that_are_known(
 ) -> None:
     sought, nearest = list[np.ndarray](), lifted_starts._nearest
 
-    def press(rows: Callable[[np.ndarray], Rows | None], state: np.ndarray) -> np.ndarray:
-        sought.append(nearest(rows, state))
+    def press(
+        rows: Callable[[np.ndarray], Rows | None], state: np.ndarray, free: list[bool] | None = None
+    ) -> np.ndarray:
+        sought.append(nearest(rows, state, free))
         if len(sought) == 6:
             raise KeyboardInterrupt
         return sought[-1]
@@ -384,6 +386,33 @@ def test_ctrl_c_while_windows_get_their_first_states_keeps_those_that_are_known(
     assert fit.interrupted and fit["arm_inertia"].value == pytest.approx(0.0033)
     left = fit.result.message.removeprefix("interrupted before the search: states at ")
     assert left.endswith(" borders of windows were not sought") and 0 < int(left.split()[0]) < 19
+
+
+@pytest.mark.parametrize(("calls", "steps"), [(1, 0), (6, 0), (0, 1), (0, 8)])
+def test_a_fit_that_was_stopped_before_its_search_goes_on_to_the_same_bits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, calls: int, steps: int
+) -> None:
+    """Its journal was refused as one of another fit: it began with the states that were known when Ctrl-C came."""
+    made = {"calls": 0, "steps": 0}
+    nearest = lifted_starts._nearest
+
+    def count(what: str, last: int) -> None:
+        made[what] += 1
+        if made[what] == last:
+            raise KeyboardInterrupt
+
+    def press(*given: object) -> np.ndarray:
+        count("calls", calls)
+        return nearest(*given)  # type: ignore[arg-type]
+
+    def fit(**more: object) -> sb.Fit:
+        return sb.fit(swing(shooting=0.4), parameters=list(WANTED), profiles=False, refine=False, **more)  # type: ignore[arg-type]
+
+    alone, path = fit(), tmp_path / "journal"
+    monkeypatch.setattr(lifted_starts, "_nearest", press)
+    assert fit(journal=path, progress=lambda _: count("steps", steps)).interrupted and path.is_file()
+    monkeypatch.setattr(lifted_starts, "_nearest", nearest)
+    assert fit(journal=path).result.estimates == alone.result.estimates and not path.exists()
 
 
 def test_windows_are_refused_where_they_cannot_be() -> None:

@@ -26,6 +26,7 @@ from ..result.shot import ShotMotion
 from ..statistics.chain import Chain
 from ..statistics.spectral import autocorrelation
 from .growth import over_fit
+from .journal import leave
 from .lifted import Lifted
 from .lifted_motion import Motion
 from .lifted_starts import begun
@@ -114,6 +115,8 @@ def _nearer(
     """
     parts = [_in_parts(e) for e in experiments]
     short, undone = begun([e for e, _ in parts], wanted, at.u)
+    if undone:
+        leave()  # with all states known, its first problem is another
     short = [_with_gap(e, LOOSE * _size(e)) for e in short]
     problem = FitProblem(short, wanted, threads=threads, expanded=expanded)
     try:

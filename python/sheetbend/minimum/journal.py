@@ -55,6 +55,11 @@ def current() -> Journal | None:
     return _current.get()
 
 
+def leave() -> None:
+    """Let problems that are made from now on go without the journal: a fit that goes on will not come to them."""
+    _current.set(None)
+
+
 class Journal(AbstractContextManager["Journal"]):
     """A file of evaluations, in use for all problems that are made inside its context.
 
