@@ -40,6 +40,27 @@ def test_readings_within_the_range_end_at_no_limit(twin, off: float) -> None:
     assert clipped(problem, np.log(at), 0) == []
 
 
+def hung(density: float) -> sb.Scene:
+    """A rod at rest between two grips."""
+    scene, points = sb.Scene("hung"), np.array([[0.0, 0.0, 0.0], [0.25, 0.0, -0.14], [0.5, 0.0, 0.0]])
+    EI, GJ = shaken.TRUTH["rod_EI"], shaken.RATIO * shaken.TRUTH["rod_EI"]
+    grips = [sb.Grip.fixed([x, 0.0, 0.0], [1.0, 0.0, 0.0]) for x in (0.0, 0.5)]
+    made = {"length": 0.6, "segments": 12, "points": points, "density": density, "EI": EI, "GJ": GJ}
+    sb.add_rod(scene, "rod", **made, start=grips[0], end=grips[1], bend_damping=0.01, twist_damping=0.01)  # type: ignore[arg-type]
+    return scene
+
+
+def test_a_force_that_never_changes_shows_no_limit(twin) -> None:
+    """A rod at rest whose density is told too small or too large; its sensor was said to end at what it reads."""
+    true, start = hung(0.12), sb.equilibrium(hung(0.12)).nodes
+    places = np.repeat(start[None, true.ropes["rod"].particles[list(shaken.MARKS)]], len(twin[0]), axis=0)
+    forces = sb.simulate_forces(true, np.arange(2, 120) * 0.01, ("rod", "start"), shaken.SOLVER, start="equilibrium")
+    for density in (0.1, 0.12, 0.16):
+        e = shaken.experiment((twin[0], places, forces), 1, scene=hung(density))
+        problem = FitProblem([e], as_parameters({"rod_EI": {"initial": 6e-3}}, [e]))
+        assert clipped(problem, np.log([6e-3]), 0) == []
+
+
 def test_without_forces_nothing_is_asked(twin) -> None:
     e = shaken.experiment(twin, 0, with_forces=False)
     problem = FitProblem([e], as_parameters(shaken.PARAMETERS, [e]))

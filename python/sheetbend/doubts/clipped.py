@@ -72,7 +72,8 @@ def clipped(problem: FitProblem, u: Array, i: int) -> list[Told]:
 
 
 def _ends(problem: FitProblem, i: int, k: int) -> Iterator[_End]:
-    """The ends of each channel of the i-th experiment's k-th sensor where several readings are as good as alike."""
+    """The ends of each channel of the i-th experiment's k-th sensor where several readings are as good as alike, and
+    several are not: a force that never changes shows no limit."""
     layout, sensor, special = problem.rows_layout(), problem.experiments[i].forces[k], require("scipy.special", "fit")
     measured = np.asarray(problem.sensed[i][k]["measured"])
     number = np.full(measured.shape, -1)
@@ -88,7 +89,7 @@ def _ends(problem: FitProblem, i: int, k: int) -> Iterator[_End]:
             most = special.ndtri(1.0 - 0.5 / np.count_nonzero(to > to.max() - 2 * NEAR * noise))
             limit = float(to.max() - most * noise)  # of so many readings at a limit, noise lifts one so far
             at = seen[to > limit - NEAR * noise]
-            if len(at) >= FEWEST and limit > 0.0:
+            if FEWEST <= len(at) <= len(seen) - FEWEST and limit > 0.0:
                 yield _End(channel, side, side * limit, at, own[at], sigma)
 
 
