@@ -23,7 +23,7 @@ bool closes_loop(const Scene& scene, const std::vector<Member>& members) {
       const auto found = body_of.find(node);
       return scene.role[node] != Role::free ? ground : found == body_of.end() ? -1 : found->second;
     };
-    if (end(0) < 0 || end(1) < 0) continue;
+    if (end(0) < 0 || end(1) < 0 || (end(0) == ground && end(1) == ground)) continue;  // such as a pinned mean
     const int a = root(end(0)), b = root(end(1));
     if (a == b) return true;
     joined[a] = b;
