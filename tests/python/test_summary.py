@@ -8,7 +8,7 @@ import pytest
 from sheetbend.report.fit_result import FitResult
 from sheetbend.report.report import plain, sections
 from sheetbend.result.estimate import VERDICTS, Estimate, Premise
-from sheetbend.result.motions import RecordingFit
+from sheetbend.result.motions import ForceFit, RecordingFit
 from sheetbend.result.result import Misfit
 
 
@@ -63,6 +63,44 @@ def test_the_most_urgent_step_comes_first(good: FitResult) -> None:
 def test_every_verdict_but_identified_asks_for_something(good: FitResult, verdict: str) -> None:
     step = told(replace(good, estimates=(estimate("EI"), estimate("drag", verdict))))["next"]
     assert ("use the values with their intervals" in step) == (verdict == "identified") == ("drag" not in step)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"converged": False},
+        {"interrupted": True},
+        {"misfit": Misfit(reduced_chi_square=9.0, smallest_sigma=5e-4, largest_sigma=5e-4, model_error=1e-3)},
+    ],
+    ids=["stopped", "interrupted", "far from the noise"],
+)
+def test_values_are_not_to_be_used_while_something_speaks_against_them(
+    good: FitResult, change: dict[str, object]
+) -> None:
+    """The second step after "the model lacks something there" was to use the values with their intervals."""
+    poor = told(replace(good, **change))
+    assert not any("use the values with" in poor.get(step, "") for step in ("next", "then"))
+
+
+def test_no_minimum_is_no_convergence(good: FitResult) -> None:
+    lost = replace(good, estimates=(estimate("EI", "no minimum"), estimate("drag", "no minimum")))
+    assert told(lost)["result"] == "the optimizer stopped, but in no minimum; 2 of 2 parameters are without a minimum"
+    assert told(replace(good, interrupted=True))["result"].startswith("the optimizer converged, and the fit was then")
+    assert told(replace(good, estimates=()))["result"] == "the optimizer converged"
+
+
+def test_warnings_are_to_be_read_first(good: FitResult) -> None:
+    assert told(replace(good, warnings=("sigma is guessed",)))["next"].endswith("after you have read the warnings")
+
+
+def test_force_sensors_count_as_recordings_do(good: FitResult) -> None:
+    """Where only forces were held out, the prediction was said to be untested."""
+    force = ForceFit(recording="take", sensor="grip", rows=90, rms=0.1, held_out=0.3, baseline=0.2, unit="N")
+    seen = replace(good.recordings[0], held_out=None, baseline=None)
+    said = told(replace(good, recordings=(seen,), forces=(force,)))
+    assert "by 1 mm and 0.1 N (rms)" in said["fit"]
+    assert said["prediction"].startswith("data that were not fitted are missed by 0.3 N (rms); a prediction without")
+    assert "grip of take is predicted worse" in said["next"] and "then" not in said
 
 
 def test_names_of_many_parameters_are_cut(good: FitResult) -> None:

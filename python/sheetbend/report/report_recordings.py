@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..quantities.wording import short
-from ..result.motions import RecordingFit
+from ..result.motions import ForceFit, RecordingFit
 from ..result.result import FitData
 from .tables import Section
 
@@ -101,7 +101,7 @@ def _motion_row(recording: RecordingFit) -> tuple[str, ...]:
     return (recording.name, short(motion * factor), unit, share, *rhythm, difference)
 
 
-def readable(recording: RecordingFit) -> tuple[float, str]:
-    """Factor and unit in which the errors of a recording are written."""
+def readable(recording: RecordingFit | ForceFit) -> tuple[float, str]:
+    """Factor and unit in which the errors of a recording or a force sensor are written."""
     sizes = (recording.rms or 0.0, recording.held_out or 0.0, recording.baseline or 0.0)
     return (1e3, "mm") if recording.unit == "m" and max(sizes) < 1 else (1.0, recording.unit)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 from ..quantities.wording import short
 from ..result.estimate import UNSOUND
-from ..result.motions import RecordingFit
+from ..result.motions import ForceFit, RecordingFit
 from ..result.result import FitData
 from .dependence import dependences
 from .report_recordings import readable
@@ -18,6 +18,7 @@ NAMED = 4  # parameters of one verdict that are named
 STEPS = 2  # next steps at most, called next and then
 ALIKE = 1.25  # times the given noise: residuals up to there are called as large as it
 FAR = 2.0  # times the given noise: from there on, the next step is to look at the residuals
+IS = {"no minimum": "without a minimum"}  # verdicts that do not go on "2 of 3 parameters are"
 OPEN = ("one-sided", "at a bound", "at its floor", "not identifiable")
 
 
@@ -34,16 +35,23 @@ def summary(result: FitData) -> Section:
 
 def _outcome(result: FitData) -> str:
     """How the search ended, and the verdicts; those of few parameters with their names."""
-    end = "the optimizer was interrupted" if result.interrupted else "the optimizer converged"
-    if not (result.converged or result.interrupted):
-        end = "the optimizer did not converge"
     total, counts = len(result.estimates), Counter(e.verdict for e in result.estimates)
     verdicts = [
-        f"{count} of {total} parameters {'is' if count == 1 else 'are'} {verdict}"
+        f"{count} of {total} parameters {'is' if count == 1 else 'are'} {IS.get(verdict, verdict)}"
         + (f" ({_names(result, (verdict,))})" if len(counts) > 1 and verdict != "identified" else "")
         for verdict, count in counts.most_common()
     ]
-    return f"{end}; {', '.join(verdicts)}"
+    return "; ".join([_end(result), *([", ".join(verdicts)] if verdicts else [])])
+
+
+def _end(result: FitData) -> str:
+    """How the search ended."""
+    if result.interrupted:
+        return f"the optimizer {'converged, and the fit was then' if result.converged else 'was'} interrupted"
+    if not result.converged:
+        return "the optimizer did not converge"
+    nowhere = any(e.verdict == "no minimum" for e in result.estimates)
+    return "the optimizer stopped, but in no minimum" if nowhere else "the optimizer converged"
 
 
 def _names(result: FitData, verdicts: Sequence[str]) -> str:
@@ -58,7 +66,7 @@ def _noise_ratio(result: FitData) -> float:
 
 
 def _residuals(result: FitData) -> str:
-    far, ratio = _span(result.recordings, lambda r: r.rms), _noise_ratio(result)
+    far, ratio = _span([*result.recordings, *result.forces], lambda r: r.rms), _noise_ratio(result)
     if not far:
         return ""
     words = f"the simulation misses the fitted data by {far} (rms)"
@@ -69,8 +77,15 @@ def _residuals(result: FitData) -> str:
     return words
 
 
+def _held_out(result: FitData) -> dict[str, RecordingFit | ForceFit]:
+    """Recordings and force sensors of which a part was not fitted, by name."""
+    every: dict[str, RecordingFit | ForceFit] = {r.name: r for r in result.recordings}
+    every |= {f"{f.sensor} of {f.recording}": f for f in result.forces}
+    return {name: r for name, r in every.items() if r.held_out is not None}
+
+
 def _prediction(result: FitData) -> str:
-    held = [r for r in result.recordings if r.held_out is not None]
+    held = [*_held_out(result).values()]
     if not held:
         return "not tested, because nothing was held out"
     words = f"data that were not fitted are missed by {_span(held, lambda r: r.held_out)} (rms)"
@@ -78,7 +93,9 @@ def _prediction(result: FitData) -> str:
     return f"{words}; a prediction without physics misses them by {without}" if without else words
 
 
-def _span(recordings: Sequence[RecordingFit], error: Callable[[RecordingFit], float | None]) -> str:
+def _span(
+    recordings: Sequence[RecordingFit | ForceFit], error: Callable[[RecordingFit | ForceFit], float | None]
+) -> str:
     """The smallest and the largest error, for each unit."""
     found: dict[str, list[float]] = {}
     for r in recordings:
@@ -95,18 +112,29 @@ def _span(recordings: Sequence[RecordingFit], error: Callable[[RecordingFit], fl
 
 def _steps(result: FitData) -> Iterator[str]:
     """What to do, the most urgent first."""
+    first = [*_before_use(result)]
+    yield from first
+    if all(r.held_out is None for r in (*result.recordings, *result.forces)):
+        yield "hold out a part of the data (`held_out`), to see how well the model predicts"
+    if not first:
+        yield "use the values with their intervals" + (", after you have read the warnings" if result.warnings else "")
+
+
+def _before_use(result: FitData) -> Iterator[str]:
+    """What to do before the values are used, the most urgent first; nothing where the report has no objection."""
     verdicts = {e.verdict for e in result.estimates}
     if result.interrupted:
         yield "continue the fit, for example with `sheetbend fit --resume`, before you use the values"
     elif not result.converged:
-        yield "raise `max_iterations`, begin nearer to the answer, or fit the beginning of the motion first (`windows`)"
+        windows = ", or fit the beginning of the motion first (`windows`)" if result.growth else ""
+        yield f"raise `max_iterations`, begin nearer to the answer{windows}"
     if verdicts & {*UNSOUND}:
         yield f'do not use {_names(result, UNSOUND)} before you have read "What contradicts this fit"'
-    worse = [r.name for r in result.recordings if r.held_out is not None and r.baseline and r.held_out > r.baseline]
+    worse = [name for name, r in _held_out(result).items() if r.baseline and r.held_out and r.held_out > r.baseline]
     if worse:
         yield f"look in report.html why {', '.join(worse[:NAMED])} is predicted worse than without physics"
     if _noise_ratio(result) > FAR:
-        yield "look at which markers are missed, and when: the model lacks something there, or sigma is too small"
+        yield "look at where and when the residuals are large: the model lacks something there, or sigma is too small"
     if verdicts & {*OPEN}:
         yield f'read what "What the data cannot tell" says about {_names(result, OPEN)}'
     weak = _names(result, ("weak",))
@@ -119,7 +147,3 @@ def _steps(result: FitData) -> Iterator[str]:
         yield f'check that {on.name} is right to {on.size}. If it is not, use "+/- in all" as the half-width of {name}'
     if weak and "identified" in verdicts:
         yield narrower
-    if all(r.held_out is None for r in result.recordings):
-        yield "hold out a part of the data (`held_out`), to see how well the model predicts"
-    if not (found or verdicts - {"identified"}):
-        yield "use the values with their intervals"
