@@ -243,7 +243,7 @@ def test_motions_share_a_figure() -> None:
     assert [len(axes.patches) for axes in panels] == [1, 0]
     strips = [axes for axes in panels[0].figure.axes if axes not in panels]
     np.testing.assert_allclose(strips[0].lines[1].get_ydata(), 1e3 * (np.cos(times) - np.sin(times)))
-    with pytest.raises(InputError, match="empty"):
+    with pytest.raises(InputError, match="at least one"):
         plot_motions([])
 
 
@@ -261,7 +261,7 @@ def test_shape_and_estimate_figures(result: FitResult) -> None:
     assert [axes.get_xlabel() for axes in panels] == ["[Pa]", "[s]", "[N]"]
     with pytest.raises(InputError, match="at least one"):
         plot_shapes([], [])
-    with pytest.raises(InputError, match="empty"):
+    with pytest.raises(InputError, match="at least one"):
         plot_estimates([])
 
 

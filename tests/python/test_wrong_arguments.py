@@ -8,7 +8,7 @@ import math
 import re
 import signal
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -168,6 +168,13 @@ def test_a_wrong_first_argument_is_refused(module: str, name: str) -> None:
         if not (name == "screened" and label in ("empty text", "empty list", "empty mapping")):  # nothing to screen
             with pytest.raises(sb.SheetbendError):
                 call(wrong, *more)
+
+
+@pytest.mark.parametrize("call", [sb.gripped.fit_rope, lambda given: sb.gripped.screened(given, 0.1)])
+def test_a_generator_of_recordings_is_refused(call: Callable[[object], object]) -> None:
+    """The check took its recordings, and the fit began without them."""
+    with pytest.raises(sb.SheetbendError, match=r"recordings: must be"):
+        call(iter([sb.Recording(np.zeros((30, 6, 3)), np.arange(30.0))]))
 
 
 def test_infinity_in_single_precision_is_no_number() -> None:

@@ -16,7 +16,7 @@ from typing import Literal
 
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import is_number, is_several
+from ..arrays.checks import is_list, is_number
 from ..errors import InputError
 from ..fitting.fit import Fit
 from ..minimum.journal import journaled
@@ -196,7 +196,7 @@ def _check(
     if marker_mass and density is None:
         fix = "weigh the rope too and give its density, or leave it out"
         raise InputError("marker_mass", "needs the rope's density", marker_mass, fix)
-    if not is_several(recordings) or not any(True for _ in recordings):
+    if not is_list(recordings) or not len(recordings):
         raise InputError("recordings", "must be at least one", recordings, "give a list of recordings")
     if starts is not None:
         check_count(starts)

@@ -17,7 +17,7 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.checks import is_several
+from ..arrays.checks import is_list
 from ..errors import InputError, RecordingError
 from ..recording.recording import Recording
 from .alike import FEWEST, alike
@@ -71,7 +71,7 @@ def screened(recordings: Sequence[Recording | GrippedMotion], smoothing: float, 
     """
     if isinstance(recordings, Screened):
         return recordings
-    if not is_several(recordings):
+    if not is_list(recordings):
         raise InputError("recordings", "must be a list", recordings, "give what sb.read_recordings returns")
     for i, recording in enumerate(recordings):
         if not isinstance(recording, Recording | GrippedMotion):
