@@ -279,6 +279,21 @@ def test_strays_are_left_out_of_a_draft(tmp_path: Path) -> None:
     assert any("m11 is seen in less than a fifth of the frames" in sentence for sentence in found.seen)
 
 
+@pytest.mark.parametrize(("count", "calm", "apart"), [(9, 4, 0.1), (12, 6, 0.05), (20, 12, 0.05)])
+def test_a_rope_whose_upper_part_hangs_still_keeps_its_markers(count: int, calm: int, apart: float) -> None:
+    """The top markers were taken for marks of the room, and the rope came out shorter."""
+    t = np.arange(240) / 60
+    x = np.zeros((len(t), count, 3))
+    x[..., 2] = 1.0 - apart * np.arange(count)
+    swing = 0.08 * (np.clip(np.arange(count) - calm + 1, 0, None) / (count - calm)) ** 1.5
+    x[..., 0] = swing * (np.sin(6.0 * t) * np.exp(-t / 5.0))[:, None]
+    x += np.random.default_rng(0).normal(0.0, 5e-4, x.shape)
+    assert not seen(sb.Recording(x, t)).strangers
+    x = np.concatenate([x, np.broadcast_to([2.0, 1.0, 0.0], (len(t), 1, 3))], axis=1)
+    (words,) = seen(sb.Recording(x, t, [f"m{k}" for k in range(count)] + ["wall"])).strangers
+    assert words.startswith("wall is in one place")
+
+
 def test_labels_that_are_exchanged_and_reflections(tmp_path: Path) -> None:
     """Two labels that were exchanged from 1.2 s on made a rope of 0.7 m 0.87 m long, and reflections 0.89 m; nothing
     was said."""

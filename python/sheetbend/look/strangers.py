@@ -72,6 +72,9 @@ def of_the_room(recording: Recording, still: Array, distance: Array) -> Stranger
     away = mean[resting, nearest]
     holds = (away <= FAR * spacing) | (varies[resting, nearest] <= KEEPS * np.minimum(moved[nearest], spacing))
     holds &= away <= FAR * max(float(away[holds].min(initial=np.inf)), spacing)
+    between = mean[np.ix_(resting, resting)]
+    while (more := ~holds & (between[:, holds].min(axis=1, initial=np.inf) <= FAR * spacing)).any():
+        holds |= more  # the line goes on where it hangs still
     object_ = np.concatenate([moving, resting[holds]])
     size = float(mean[np.ix_(object_, object_)].max())
     return _told(
