@@ -178,9 +178,11 @@ def _repeated(s: Seen) -> int:
     step = np.abs(np.diff(x, axis=0)).max(axis=1)
     if not step.any():  # shapes at rest, or one frame
         return 0
-    moves = step > 0.5 * np.median(step)
-    again = np.flatnonzero((step[1:-1] == 0.0) & moves[:-2] & moves[2:])
-    return len(again) if len(again) >= REPEATED else 0
+    digit = step[step > 0.0].min()  # rounding makes steps of one last digit as often as of none
+    moves = step > max(0.5 * np.median(step), 2.5 * digit)
+    between = step[1:-1][moves[:-2] & moves[2:]]
+    again, rounded = int((between == 0.0).sum()), int(((between > 0.0) & (between < 1.5 * digit)).sum())
+    return again if again >= REPEATED + 2 * rounded else 0
 
 
 def _neighbors(s: Seen) -> float:

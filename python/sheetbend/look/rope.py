@@ -49,7 +49,9 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         return None
     if s.up_by == "guess" and _stands(s, found):
         turned = describe([replace(take, seen=take.seen.upside_down()) for take in takes], measured)
-        return None if turned is None else turned._replace(up="-" + "xyz"[s.up])
+        up = "xyz"[s.up]
+        stands = f"with {up} up, the free end would be above what holds it: give --up {up} if it stands there"
+        return None if turned is None else turned._replace(up=f"-{up}", notes=[*turned.notes, stands])
     pushed = None
     if s.rest and not s.static and not found.grips and len(takes) == 1:
         free = freed(takes[0], found.order, "rope")
