@@ -17,6 +17,7 @@ import numpy as np
 from ..arrays.timeseries import Array
 from ..errors import SheetbendError
 from ..experiment.experiment import Experiment
+from ..experiment.found_start import start_nodes
 from ..minimum.problem import FitProblem
 from ..motion.simulate import simulate
 from ..motion.values import constraint_values
@@ -57,7 +58,8 @@ def deformed(problem: FitProblem, u: Array, name: str) -> float:
         times = np.maximum(e.scene_times(recording.times, values), 0.0)
         some = times[np.linspace(0, len(times) - 1, FRAMES).astype(int)[1:]]
         with suppress(SheetbendError):
-            for x in simulate(e.scene, np.unique(np.rint(some / solver.h)) * solver.h, solver, values).nodes:
+            at, start = np.unique(np.rint(some / solver.h)) * solver.h, start_nodes(e, values)
+            for x in simulate(e.scene, at, solver, values, start).nodes:
                 C = constraint_values(e.scene, x, values)[name][:, rows]
                 squares.append(float((C**2).sum(axis=1).mean()))
     return float(np.sqrt(np.mean(squares))) if squares else 0.0

@@ -6,6 +6,7 @@ Fitted beside the parameters it is 4 mm, and nothing is left. Another cause leav
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -67,4 +68,5 @@ def _with_error(problem: FitProblem, i: int, told: Told, size: float) -> FitProb
     scene.quantities = {**scene.quantities, NAME: Quantity(NAME, size, told.unit, positive=False, scale=abs(size))}
     scene.terms = [*scene.terms, *(Term(array, where, by, ((NAME, "identity"),)) for array, where, by in inputs)]
     made = [replace(e, scene=scene) if k == i else other for k, other in enumerate(problem.experiments)]
-    return with_parameter(problem.of(made), Parameter(name=NAME, initial=size, scale=abs(size)))
+    lower = 0.0 if told.missing is not None and not told.signed else -math.inf
+    return with_parameter(problem.of(made), Parameter(name=NAME, initial=size, lower=lower, scale=abs(size)))

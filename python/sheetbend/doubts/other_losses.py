@@ -104,9 +104,9 @@ def other_losses(problem: FitProblem, u: Array) -> dict[str, str]:
 
     for each in tried:
         ask(*each, len(tried))
-    names = [] if best else _undamped(problem, groups, only=touches)
+    names = _undamped(problem, groups, only=touches) if all(share <= LESS for share, _ in best.values()) else []
     for name in names:
-        if len(best) == len(groups):
+        if sum(share > LESS for share, _ in best.values()) == len(groups):
             break
         end = _searched(with_free_damping(stepping, u, name), np.append(u, math.log(FRAMES[0])))
         ask(LESS, _lacks_damping(name), end, len(tried) + len(names))
