@@ -172,6 +172,8 @@ def test_one_command_fits_all_and_does_nothing_twice(ropes: Path) -> None:
     assert (out / "none" / "error.txt").read_text().startswith(f"{none}: is no valid TOML")
     without = last_line(run("collect", out, "--output", ropes / "part", "--json"))["without"]
     assert list(without) == ["c", "none"] and "lost.npz" in without["c"]
+    alone = last_line(run("collect", out / "none", "--json"))["error"]
+    assert f"hold no fit.json; none: {none}: is no valid TOML" in alone["problem"]
     none.unlink()
     (out / "none" / "error.txt").unlink()
     before = {name: (out / name / "fit.json").stat().st_mtime_ns for name in "abd"}
@@ -188,6 +190,12 @@ def test_one_command_fits_all_and_does_nothing_twice(ropes: Path) -> None:
     written = {path.name for path in (ropes / "all").iterdir()}
     assert written >= {"fits.csv", "parameters.tsv", "population.json", "population.txt"}
     assert json.loads((ropes / "all/population.json").read_text())["rope_EI"]["found"]["count"] == 4
+    broken.write_text(good.replace('file = "c.npz"', 'file = "lost.npz"'))
+    (out / "a" / "fit.json").write_text("{}")  # as of another version
+    mended = last_line(run("fit", ropes / "*.toml", "--output", out, "--json"))["fits"]
+    assert mended["a"] == codes["a"] and mended["c"] == 2
+    collected = last_line(run("collect", out, "--output", ropes / "all", "--json"))
+    assert len(collected["fits"]) == 4 and collected["without"] == {} and list(collected["older"]) == ["c"]
 
 
 def test_several_fits_refuse_what_is_for_one(ropes: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 import sheetbend as sb
 from sheetbend.config import load, parse
 from sheetbend.config.reference import fabric_tables, renewed
-from sheetbend.config.values import with_values, write
+from sheetbend.config.values import with_finer, with_values, write
 
 ROOT = Path(__file__).parents[2]
 
@@ -341,6 +341,9 @@ class TestValues:
         text = ROPE.replace("[parameters.rope_bend_damping]", "[parameters.rope_bend_damping]\nprivate = true")
         study = load(written(folder, text))
         new = with_values(study.config, {"rope_EI": 3e-3, "rope_bend_damping[swing]": 0.05, "unheard_of": 1.0})
+        finer = with_finer(new, {"rope_EI": 1e-4})
+        assert finer.parameters["rope_EI"].finer == pytest.approx(3.1e-3)
+        assert with_values(finer, {"rope_EI": 3e-3}).parameters["rope_EI"].finer is None  # of an earlier fit
         (folder / "deeper").mkdir()
         write(new, folder / "deeper" / "fitted.toml", folder)
         (e,) = load(folder / "deeper" / "fitted.toml").experiments

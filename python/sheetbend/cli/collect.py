@@ -53,12 +53,16 @@ def _collect(console: Console, results: list[Path], output: Path) -> Outcome:
     for file in dict.fromkeys(files):
         name = file.resolve().parent.name
         fits[name if name not in fits else str(file.parent)] = FitResult.load(file)
-    without = {name: words for path in results for name, words in _without(path).items()}
+    unmade = {name: words for path in results for name, words in _unmade(path).items()}
+    without = {name: words for name, words in unmade.items() if name not in fits}
+    older = {name: words for name, words in unmade.items() if name in fits}
     found = Collected.of(fits)
     folder, report = made("--output", output), found.report()
     console.print("\n" + report, soft_wrap=True, end="")
     for name, words in without.items():
         console.print(f"no result of {name}: {words}", soft_wrap=True)
+    for name, words in older.items():
+        console.print(f"the result of {name} is that of an earlier fit; the last one failed: {words}", soft_wrap=True)
     write_text(folder / "fits.csv", found.table())
     write_text(folder / "parameters.tsv", found.petab())
     write_text(folder / "population.json", json_.dumps(strict(found.to_dict()), indent=2, allow_nan=False) + "\n")
@@ -71,13 +75,12 @@ def _collect(console: Console, results: list[Path], output: Path) -> Outcome:
         except MissingExtraError as error:
             console.print(f"no forest plot: {error}", soft_wrap=True)
     console.print(f"\nwritten to {folder}: {', '.join(names)}", soft_wrap=True)
-    return Outcome(
-        {"population": found.to_dict(), "fits": list(fits), "without": without, "output": str(folder), "files": names}
-    )
+    told = {"fits": list(fits), "without": without, "older": older, "output": str(folder), "files": names}
+    return Outcome({"population": found.to_dict(), **told})
 
 
-def _without(path: Path) -> dict[str, str]:
-    """Why fits in the folders at a path have no result, by the name of the folder."""
+def _unmade(path: Path) -> dict[str, str]:
+    """Why the last fits in the folders at a path made no result, by the name of the folder."""
     folders = [] if path.is_file() else [path, *sorted(path.glob("*/"))]
     found = {}
     for folder in folders:
@@ -94,5 +97,8 @@ def _fits_in(path: Path) -> list[Path]:
         return [path]
     found = [path / RESULT] if (path / RESULT).is_file() else sorted(path.glob(f"*/{RESULT}"))
     if not found:
-        raise ConfigError("results", "hold no fit.json", str(path), "give the folders that `sheetbend fit` wrote to")
+        unmade = [f"{name}: {words}" for name, words in _unmade(path).items()]
+        more = f"; and {len(unmade) - 1} more" if len(unmade) > 1 else ""
+        why = f"hold no fit.json; {unmade[0]}{more}" if unmade else "hold no fit.json"
+        raise ConfigError("results", why, str(path), "give the folders that `sheetbend fit` wrote to")
     return found

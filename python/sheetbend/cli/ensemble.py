@@ -12,7 +12,7 @@ from pathlib import Path
 from rich.console import Console
 
 from ..config import GrippedConfig, parse_any
-from ..errors import ConfigError, SheetbendError
+from ..errors import ConfigError, InputError, SheetbendError
 from ..files.door import noting, reading
 from ..files.whole import UnwrittenError, write_text
 from ..minimum.workers import naming_losses
@@ -40,13 +40,14 @@ def fit_all(
         ConfigError: the pattern names no configuration, or two have the same name.
     """
     tasks, unread = _tasks(pattern, output)
-    left = [(path, folder) for path, folder in tasks if not _done(path, folder)]
+    made = {folder: _made(path, folder) for path, folder in tasks}
+    left = [(path, folder) for path, folder in tasks if made[folder] is None]
     console.print(f"{len(tasks)} configurations, {len(tasks) - len(left)} of them done", soft_wrap=True)
     for path, folder in tasks:
         if folder != output / path.stem:  # where the error of a file without a name was
             (output / path.stem / ERROR).unlink(missing_ok=True)
     codes = {str(path): _failed(console, output / path.stem, error) for path, error in unread.items()}
-    codes |= {folder.name: _code(folder, strict) for path, folder in tasks if (path, folder) not in left}
+    codes |= {folder.name: code_of([result], strict) for folder, result in made.items() if result is not None}
     futures: list[Future[tuple[str, Code]]] = []
     try:
         if executor is not None:
@@ -97,18 +98,22 @@ def _tasks(pattern: str, output: Path) -> tuple[list[tuple[Path, Path]], dict[Pa
     return [(path, output / name) for name, path in taken.items()], unread
 
 
-def _done(path: Path, folder: Path) -> bool:
-    """Whether a result is there that is newer than the configuration and its recordings, with no journal left."""
+def _made(path: Path, folder: Path) -> FitResult | None:
+    """The result that is there, if it is newer than the configuration and its recordings, and no journal is left."""
     result = folder / RESULT
     if not result.is_file() or (folder / NAME).exists():
-        return False
+        return None
     config = parse_any(path)
     if isinstance(config, GrippedConfig):
-        return False
+        return None
     named = [name for r in config.recording for name in (r.file, r.cloud) if name is not None]
     files = [path, *(path.parent / name for name in named)]
     made = result.stat().st_mtime_ns
-    return all(file.is_file() and file.stat().st_mtime_ns < made for file in files)
+    if not all(file.is_file() and file.stat().st_mtime_ns < made for file in files):
+        return None
+    with suppress(InputError):  # another version's: fitted again
+        return FitResult.load(result)
+    return None
 
 
 def _told(single: Single, console: Console, path: Path, folder: Path, strict: bool) -> Code:
@@ -129,11 +134,6 @@ def _failed(console: Console, folder: Path, error: SheetbendError, ahead: str = 
         folder.mkdir(parents=True, exist_ok=True)
         write_text(folder / ERROR, f"{ahead}{error}\n")
     return Code.BAD_INPUT if isinstance(error, ConfigError) else Code.NOT_CONVERGED
-
-
-def _code(folder: Path, strict: bool) -> Code:
-    """The code of a fit that was made before."""
-    return code_of([FitResult.load(folder / RESULT)], strict)
 
 
 def _apart(single: Single, path: Path, folder: Path, strict: bool) -> tuple[str, Code]:

@@ -41,7 +41,7 @@ def with_values(config: Config, values: Mapping[str, float]) -> Config:
             i = names.index(recording)
             recordings[i] = recordings[i].model_copy(update={"values": {**recordings[i].values, base: value}})
         elif not recording:
-            parameters[base] = section.model_copy(update={"initial": value})
+            parameters[base] = section.model_copy(update={"initial": value, "finer": None})
     fit = config.fit.model_copy(update={"windows": []}) if isinstance(config.fit.windows, list) else config.fit
     return config.model_copy(update={"parameters": parameters, "recording": recordings, "fit": fit})
 
