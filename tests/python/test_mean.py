@@ -126,6 +126,8 @@ def test_a_mean_is_kept_in_a_file(tmp_path: Path) -> None:
     solver, times = sb.Solver(h=5e-3, method="newton"), [0.0, 0.02]
     one, two = (sb.simulate(s, times, solver).positions for s in (scene, sb.load_scene(tmp_path / "a.scene")))
     assert np.array_equal(one, two) and one[0, tip] == approx(one[0, made.particles[face]].mean(axis=0), abs=1e-15)
+    with pytest.raises(sb.InputError, match="leaves means of particles"):
+        sb.simulate(sb.load_scene(tmp_path / "a.scene"), times, sb.Solver(h=5e-3, method="gauss_seidel"))
 
 
 def test_what_is_no_mean_is_refused() -> None:

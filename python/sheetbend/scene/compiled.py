@@ -60,6 +60,13 @@ def places_or_none(scene: SceneData, rows: Sequence[Sequence[int | None]]) -> np
     return np.where(none, -1, scene.places_of(nodes))
 
 
+def _has_means(scene: SceneData) -> bool:
+    """Also of a scene that was read from a file: `coincide` holds nodes at means, and otherwise two bodies together."""
+    centers = [nodes[0] for nodes in scene.with_axes]  # the ground's too, which means hang on
+    seconds = [g.particles[:, 1] for g in scene.groups if g.kind == "coincide" and centers]
+    return not all(np.isin(nodes, centers).all() for nodes in seconds)
+
+
 class CompiledScene:
     """Built once by `Scene.compiled`.
 
@@ -102,7 +109,7 @@ class CompiledScene:
         self._base = self._pack(scene)
         self._terms = scene.every_term
         self.contacts = tuple(c.name for c in scene.contacts.contacts)
-        self.has_means = bool(scene.means)
+        self.has_means = _has_means(scene)
         self.touches_itself = bool(scene.contacts.pieces) or scene.contacts.balls is not None
         self.settled: dict[str, SettledStart] = {}
         self.fastest: tuple[Fastest, ...] = ()
