@@ -360,6 +360,15 @@ def test_quoted_decimal_commas_between_commas(tmp_path: Path) -> None:
         Recording.load(file)
 
 
+def test_quoted_cells_of_three_decimals_and_names_with_commas(tmp_path: Path) -> None:
+    """A file that is written to the millimeter was refused as one of thousands, and a marker "arm,1" became arm.1."""
+    file = tmp_path / "take.csv"
+    file.write_text('time,a_x,a_y,a_z\n0,"0,512","1,250",3\n1,"0,513","1,251",3\n')
+    assert Recording.load(file).positions[0, 0].tolist() == [0.512, 1.25, 3.0]
+    file.write_text('time,marker,x,y,z\n0,"arm,1",1,0,0\n1,"arm,1",1,0,1\n')
+    assert Recording.load(file).markers == ("arm,1",)
+
+
 def test_decimal_commas_that_split_cells_are_named(tmp_path: Path) -> None:
     file = tmp_path / "take.csv"
     file.write_text("time,a_x,a_y,a_z\n0,00,0,50,0,25,3,00\n")

@@ -53,8 +53,8 @@ DECIMAL_COMMAS = (
     "if commas are the decimal mark and separate the cells too, export with semicolons or tabs between the cells, or "
     "with decimal points"
 )
-_DECIMAL_COMMA = re.compile(r",(?=\d)")
-_THOUSANDS = re.compile(r"[-+]?\d{1,3}(,\d{3})+")
+_DECIMAL = re.compile(r"[-+]?\d*,\d+(e[-+]?\d+)?", re.IGNORECASE)
+_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+")
 
 
 def read(path: Path) -> MarkerData:
@@ -112,7 +112,7 @@ def _rows(path: Path, text: list[tuple[int, str]]) -> list[Row]:
 
 def _quoted_decimals(rows: list[Row]) -> bool:
     """Whether quoted cells between commas hold decimal commas, and not thousands."""
-    held = [cell for _, cells in rows[1:] for cell in cells if "," in cell]
+    held = [cell for _, cells in rows[1:] for cell in cells if _DECIMAL.fullmatch(cell)]
     return any(_THOUSANDS.fullmatch(cell) is None for cell in held)
 
 
@@ -121,7 +121,10 @@ def _with_points(rows: list[Row]) -> list[Row]:
     header, *below = rows
     if any("." in cell for _, cells in below for cell in cells):
         return rows
-    return [header, *((line, [_DECIMAL_COMMA.sub(".", cell) for cell in cells]) for line, cells in below)]
+    return [
+        header,
+        *((line, [c.replace(",", ".") if _DECIMAL.fullmatch(c) else c for c in cells]) for line, cells in below),
+    ]
 
 
 def _before_time(header: list[str]) -> bool:
