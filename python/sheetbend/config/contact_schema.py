@@ -143,7 +143,9 @@ class CollisionsSection(Section):
     Its quantities are balls_restitution and balls_contact_radius (m), or balls_contact_radius_0 and so on where there
     are several radii."""
 
-    of: Name | list[Name] = key(..., "a set of particles, or several: all of their particles, which nothing holds")
+    of: Name | list[Name] = key(
+        ..., "a set of particles, or several: all of their particles, none of which is pinned or driven"
+    )
     radius: Finite | list[Finite] = key(
         ..., "of the balls: one for all, or one for each set that is named in `of`", "m"
     )
