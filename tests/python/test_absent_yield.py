@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import sheetbend as sb
@@ -63,6 +65,18 @@ def test_a_model_with_yield_moves_as_one_that_was_built_with_it() -> None:
     assert ok and np.abs(there - r).max() < 1e-9 and np.linalg.norm(J, axis=0).min() > 1.0
     assert 1.0 < deformed(problem, u, "cloth_bend") < 10.0  # 1/m
     assert np.mean(problem.evaluate(u, jacobian=False)[1] ** 2) > 3.0
+
+
+def test_a_motion_that_is_extrapolated_is_given_no_yield() -> None:
+    """Its solver refuses what yields, and the error ended the fit."""
+    smooth = replace(filmed(yield_curvature=2.0, yield_share=0.5), solver=replace(SOLVER, extrapolate=2))
+    problem = FitProblem([smooth], as_parameters(list(TRUTH), [smooth]))
+    u = np.log([1e-4, 0.02])
+    assert elastic_names([smooth]) == [] and deformed(problem, u, "cloth_bend") == 0.0
+    plain = replace(smooth, recording=replace(smooth.recording, name="plain"), name="plain", solver=SOLVER)
+    both = FitProblem([smooth, plain], as_parameters(list(TRUTH), [smooth, plain]))
+    ok, r, _ = with_yield(both, "cloth_bend", 2.0).evaluate(u, jacobian=False)
+    assert ok and np.array_equal(r[: len(r) // 2], both.evaluate(u, jacobian=False)[1][: len(r) // 2])
 
 
 def test_a_right_sheet_lacks_no_friction() -> None:

@@ -42,7 +42,7 @@ FRAMES = 9  # of the motion, at which this is asked
 
 def elastic_names(motions: Sequence[Experiment]) -> list[str]:
     """Names of the groups that could yield and do not."""
-    groups = [g for e in motions for g in e.scene.groups]
+    groups = [g for e in motions if _may_yield(e) for g in e.scene.groups]
     return list(dict.fromkeys(g.name for g in groups if g.kind in YIELDING))
 
 
@@ -52,9 +52,9 @@ def deformed(problem: FitProblem, u: Array, name: str) -> float:
     for i, recording in enumerate(problem.recordings):
         e = problem.experiment_at(i, u)
         rows = next((YIELDING[g.kind][1] for g in e.scene.groups if g.name == name and g.kind in YIELDING), None)
-        if e.static or rows is None:
+        if not _may_yield(e) or rows is None:
             continue
-        solver, values = replace(e.solver, extrapolate=1), problem.values_of(e, u)
+        solver, values = e.solver, problem.values_of(e, u)
         times = np.maximum(e.scene_times(recording.times, values), 0.0)
         some = times[np.linspace(0, len(times) - 1, FRAMES).astype(int)[1:]]
         with suppress(SheetbendError):
@@ -67,12 +67,18 @@ def deformed(problem: FitProblem, u: Array, name: str) -> float:
 
 def with_yield(problem: FitProblem, name: str, at: float) -> FitProblem:
     """The problem whose elements of a group slide in all of its motions, beyond a deformation of `at`."""
-    return problem.of([e if e.static else replace(e, scene=_sliding(e.scene, name, at)) for e in problem.experiments])
+    made = [replace(e, scene=_sliding(e.scene, name, at)) if _may_yield(e) else e for e in problem.experiments]
+    return problem.of(made)
 
 
 def with_free_yield(problem: FitProblem, name: str, at: float) -> FitProblem:
     """The same problem with two more parameters at the end, `SHARE` and `AT`."""
     return with_parameter(with_parameter(with_yield(problem, name, at), SHARE), replace(AT, initial=at))
+
+
+def _may_yield(e: Experiment) -> bool:
+    """Whether an experiment is a motion that may have yields; only smooth motions are extrapolated."""
+    return not e.static and e.solver.extrapolate == 1
 
 
 def _sliding(scene: Scene, name: str, at: float) -> Scene:

@@ -75,7 +75,9 @@ def other_losses(problem: FitProblem, u: Array) -> dict[str, str]:
     """By free parameter, a loss with which a fit of its motion would leave much less, the best of those tried.
 
     Takes two simulations for each loss, and a Jacobian and a third where these leave less; for a restitution two more
-    Jacobians in all. A loss with which the motion has no answer tells nothing.
+    Jacobians in all. For each kind of element that could yield, four simulations, and where these promise less two
+    Jacobians and two simulations for each of up to three sizes and once more for the best. A loss with which the motion
+    has no answer tells nothing.
 
     Args:
         problem: as it was fitted.
@@ -261,7 +263,8 @@ def _lacks_yield(name: str) -> Callable[[Array], Says]:
     return lambda _: (
         lambda names, less: (
             f"{names[0] if len(names) == 1 else 'the recordings'} may lose energy by friction inside {name}: with a "
-            f"share of it that slides (yield) the fit {less}. Give it that, and fit it"
+            f"share of its stiffness that slides the fit {less}. Give it a yield (such as yield_curvature and "
+            "yield_share), and fit it"
         )
     )
 
