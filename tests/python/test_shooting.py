@@ -351,7 +351,7 @@ def test_a_wrong_loss_is_doubted_after_single_steps_of_the_states(
 
 @pytest.mark.parametrize(
     ("steps", "undone"),
-    [(1, "gaps between windows are given 10% of the motion's size"), (8, "gaps between windows are as wide as where")],
+    [(1, "gaps between windows are given 10 % of the motion's size"), (8, "gaps between windows are as wide as where")],
 )
 def test_ctrl_c_before_the_search_keeps_the_point_reached_last(steps: int, undone: str) -> None:
     reached: list[Progress] = []

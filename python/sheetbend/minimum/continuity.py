@@ -122,7 +122,9 @@ def _nearer(
     try:
         at.u = at.u if undone else walked(problem, at.u, at)
     except KeyboardInterrupt:
-        undone = f"gaps between windows are given {LOOSE:.0%} of the motion's size, and no smaller ones were sought"
+        undone = (
+            f"gaps between windows are given {100 * LOOSE:g} % of the motion's size, and no smaller ones were sought"
+        )
     problem.evaluate(at.u)
     found = []
     for i, (e, (_, count)) in enumerate(zip(experiments, parts, strict=True)):
