@@ -440,7 +440,6 @@ BAD = [
         "[[scene.drive]]",
     ),
     ("drag_linear = 0.2", "air_normal = -0.2", "scene.cloth[0].air_normal", "greater than 0"),
-    (TABLE, f"[scene.wind]\nvelocity = [1, 0, 0]\n{TABLE}", "scene", "give air_normal to a [[scene.cloth]]"),
     (TABLE, f'[scene.cloth.law]\nkind = "exponential"\nwarp = 1.0\n{TABLE}', "scene.cloth[0].law", "one number each"),
     (TABLE, f'[scene.cloth.law]\nkind = "spline"\nwarp = [1.0]\n{TABLE}', "scene.cloth[0].law", "four ratios"),
     (
