@@ -263,8 +263,8 @@ def _lacks_yield(name: str) -> Callable[[Array], Says]:
     return lambda _: (
         lambda names, less: (
             f"{names[0] if len(names) == 1 else 'the recordings'} may lose energy by friction inside {name}: with a "
-            f"share of its stiffness that slides the fit {less}. Give it a yield (such as yield_curvature and "
-            "yield_share), and fit it"
+            f"share of its stiffness that slides the fit {less}. If its stiffness is given, fit that first: a "
+            "smaller one may look alike. Else give it a yield (such as yield_curvature and yield_share), and fit it"
         )
     )
 
