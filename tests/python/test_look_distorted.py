@@ -222,3 +222,61 @@ def test_two_ropes_in_one_file_are_refused_with_the_markers_of_one(tmp_path: Pat
     recording = TAKES[name]() if name in TAKES else sb.Recording.load(EXPERIMENTS / SHIPPED[name])
     said, content = outcome(tmp_path / "two", beside_another(recording, np.random.default_rng(3)))
     assert not content and "two ropes" in said and "--markers" in said
+
+
+def side_by_side(one: sb.Recording, other: sb.Recording, off: tuple[float, float, float]) -> Table:
+    """Two recordings as one, the second one's markers beside those of the first."""
+    count = min(len(one.times), len(other.times))
+    noise = np.random.default_rng(3).normal(0.0, 1e-5, other.positions[:count].shape)
+    x = np.concatenate([one.positions[:count], other.positions[:count] + noise + off], axis=1)
+    return x, one.times[:count], [*(f"a_{name}" for name in one.markers), *(f"b_{name}" for name in other.markers)]
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "off", "what"),
+    [
+        ("toss", "toss", (0.5, 0.3, 0.0), "two rigid bodies"),
+        ("beam", "beam", (0.0, 0.2, 0.0), "two rigid bodies"),
+        ("toss", "beam", (1.0, 0.0, 0.0), "two rigid bodies"),
+        ("hand", "hand", (0.0, 0.3, 0.0), "two ropes"),
+        ("let go", "let go", (0.0, 0.2, 0.0), "two ropes"),
+        ("towel", "let go", (1.0, 0.0, 0.0), "two objects: ropes and cloths"),
+        ("let go", "beam", (0.0, 0.6, 0.0), "two objects: ropes and beams"),
+    ],
+)
+def test_two_objects_are_refused_with_the_patterns_of_each(
+    tmp_path: Path, one: str, other: str, off: tuple[float, float, float], what: str
+) -> None:
+    """Two tosses and two ropes in one hand were drafted as one rope. Two beams were no sheet "with neighbors on all
+    sides"."""
+    recordings = {name: made() for name, made in (TAKES | {"beam": takes.beam}).items() if name in (one, other)}
+    said, content = outcome(tmp_path / "two", side_by_side(recordings[one], recordings[other], off))
+    said = " ".join(said.split())
+    assert not content and f"are those of {what}" in said
+    assert "'a*'" in said and "'b*'" in said
+    result = run("new", tmp_path / "two/take.csv", "--output", tmp_path / "one.toml", "--markers", "a*")
+    assert result.exit_code == 0, result.output
+
+
+def test_holders_of_a_cloth_without_names_are_no_part_of_it(tmp_path: Path) -> None:
+    """A marker on each of two grippers was taken for the upper row of a cloth that is 0.075 m too wide."""
+    towel = takes.towel(True)
+    _, content = outcome(tmp_path / "towel", (towel.positions, towel.times, [f"m{k}" for k in range(27)]))
+    (cloth,) = content["scene"]["cloth"]
+    assert cloth["mesh"]["width"] == pytest.approx(0.4, rel=0.01) and len(cloth["markers"]) == 25
+    assert {name for grip in cloth["grip"] for name in grip["markers"]} == {"m25", "m26"}
+
+
+def test_a_beam_in_noise_of_3_mm_is_a_beam(tmp_path: Path) -> None:
+    """The noise of its distance from the clamp was taken for motion: the clamp was left out, and its end was a rope."""
+    beam = takes.beam()
+    x = beam.positions + np.random.default_rng(1).normal(0.0, 3e-3, beam.positions.shape)
+    said, content = outcome(tmp_path / "noisy", (x, beam.times, list(beam.markers)))
+    assert "a beam clamped at one end" in said and content["scene"]["rope"][0]["name"] == "beam"
+
+
+def test_a_beam_that_is_seen_too_late_is_no_rope(tmp_path: Path) -> None:
+    """Its last second was drafted as a rope through the markers of its clamp."""
+    beam = takes.beam()
+    said, content = outcome(tmp_path / "late", (beam.positions[400:], beam.times[:-400], list(beam.markers)))
+    assert not content and "do not move like a rope, beam" in said

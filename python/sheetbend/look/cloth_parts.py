@@ -6,25 +6,38 @@ import numpy as np
 
 from .held import gripping
 from .seen import FEWEST_OF_SHEET, Seen
-from .sheet import components
+from .sheet import components, spacing
 
 Array = np.ndarray
+EVEN = 0.1  # of the spacing: how much the distances of neighbors in rows and columns vary
+FEW = 0.2  # of the markers, that have no neighbor at the spacing of all others
 
 
 def cloth_parts(s: Seen) -> tuple[dict[str, list[int]], list[int]]:
     """Markers of each cloth by its name, and the others.
 
     Markers that hang together are on one cloth. Where many names share a stem, such as towel_1, towel_2, ..., those of
-    rare stems are on what holds the cloth. So are those whose names or whose file say it.
+    rare stems are on what holds the cloth. So are those whose names or whose file say it, and the few that have no
+    neighbor at the spacing of all others.
     """
     stems = [name.rstrip("0123456789").rstrip("_-.: ") for name in s.recording.markers]
     common = {stem for stem in stems if stems.count(stem) >= FEWEST_OF_SHEET}
     held_by = gripping(s)
     left = [k for k, stem in enumerate(stems) if k not in held_by and (not common or stem in common)]
+    left = _in_step(s.apart, left)
     sheets = _apart(s.apart, left)
     cloths = {_name(stems, own, n, len(sheets)): own for n, own in enumerate(sheets)}
     on_cloth = {k for own in sheets for k in own}
     return cloths, [k for k in range(len(stems)) if k not in on_cloth]
+
+
+def _in_step(apart: Array, among: list[int]) -> list[int]:
+    """Those of markers that have neighbors at the spacing of the sheet; all of them where more than a few have none."""
+    if len(among) < FEWEST_OF_SHEET:
+        return among
+    own = apart[np.ix_(among, among)]
+    has = np.asarray(np.abs(own / spacing(own) - 1.0) < EVEN).any(axis=1)
+    return [among[k] for k in np.flatnonzero(has)] if 1.0 - has.mean() < FEW else among
 
 
 def _apart(apart: Array, among: list[int]) -> list[list[int]]:

@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import RecordingError
 from . import cantilever, cloth, flight, gripped, one_point, pendulum, rope
 from .gaps import unfilled, without_gaps
+from .objects import check_one_object
 from .seen import Seen
 from .take import Description, Measured, Take
 from .text import comment, joined, table
@@ -51,6 +52,8 @@ def draft(takes: Sequence[Take], name: str, measured: Measured | None = None) ->
     """
     measured = measured or Measured()
     first = takes[0].seen
+    for take in takes:
+        check_one_object(take.seen)
     own = [take.file for take in takes if take.seen.recording.markers != first.recording.markers]
     for model in (pendulum, flight, one_point, cantilever, cloth, gripped, rope):
         found = _described(model, takes if not own or model is rope else takes[:1], measured)

@@ -10,7 +10,6 @@ from ..arrays.shortest_tree import tree
 
 Array = np.ndarray
 SHORTER = 0.9  # of the length through the markers in the file's order: another order counts only if it is so short
-GAP = 2.5  # times every other distance of neighbors: two ropes, or a rope with a long part that no marker shows
 AXIS, FLAT = 0.97, 0.02  # cosine of the angle to an axis that is taken for it; share of a length that is flat
 
 
@@ -39,17 +38,6 @@ def forks(apart: Array, order: tuple[int, ...]) -> tuple[list[int], float]:
     neighbors, total = tree(apart, order)
     at = [k for k, near in neighbors.items() if sum(len(neighbors[j]) > 1 for j in near) >= 3]
     return at, sum(float(apart[a, b]) for a, b in pairwise(order)) / max(total, 1e-300)
-
-
-def split(apart: Array, order: tuple[int, ...]) -> tuple[tuple[int, ...], tuple[int, ...]] | None:
-    """Markers in order as two lines of three or more, where two neighbors are far more apart than all others; else
-    None."""
-    chords = np.array([apart[a, b] for a, b in pairwise(order)])
-    at = int(chords.argmax()) + 1
-    rest = np.delete(chords, at - 1)
-    if min(at, len(order) - at) < 3 or chords.max() < GAP * rest.max():
-        return None
-    return order[:at], order[at:]
 
 
 def snapped(direction: Array) -> list[float]:

@@ -32,7 +32,7 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     s = takes[0].seen
     hands, order = parts(s)
     own = sorted((*(k for body in hands for k in body), *order))
-    if len(order) < 3:
+    if len(order) < 3 or (not s.static and set(order) <= set(s.still)):  # or the markers of a clamp
         return None
     if len(own) < len(s.recording.markers):
         return _without_others(takes, measured, [s.recording.markers[k] for k in own])

@@ -114,7 +114,7 @@ def seen(recording: Recording, up: str | None = None) -> Seen:
     distance = _distances(x)
     # by each one's own noise: marks of the room make the extent large, and may be noisier
     stays = moved <= (STILL * np.fmax(each, noise) if noise else SILENT * extent)
-    if (found := strangers.of_the_room(recording, stays, distance)) is not None:
+    if (found := strangers.of_the_room(recording, stays, distance, each)) is not None:
         return _without(recording, found, up)
     still = moved <= max(STILL * noise, SILENT * extent)
     apart = np.nanquantile(distance, SHARE, axis=0)
@@ -136,7 +136,7 @@ def seen(recording: Recording, up: str | None = None) -> Seen:
         speed=_speed(recording),
         up=axis,
         up_by="user" if up is not None else "file" if told else "guess",
-        sheet=_is_sheet(x, apart, in_bodies),
+        sheet=is_sheet(x, apart, in_bodies),
     )
 
 
@@ -187,7 +187,7 @@ def _distances(x: Array) -> Array:
     return np.asarray(np.linalg.norm(some[:, :, None] - some[:, None], axis=3))
 
 
-def _bodies(rigid: Array, apart: Array, still: Array) -> list[tuple[int, ...]]:
+def _bodies(keeps: Array, apart: Array, still: Array) -> list[tuple[int, ...]]:
     """Largest groups of three or more moving markers of which every two keep their distance, and that lie close
     together: a straight piece of rope is no body."""
     left = set(np.flatnonzero(~still).tolist())
@@ -197,15 +197,21 @@ def _bodies(rigid: Array, apart: Array, still: Array) -> list[tuple[int, ...]]:
             continue
         group = [first]
         for other in sorted(left - {first}, key=lambda k: apart[first, k]):
-            if all(rigid[other, k] for k in group):
+            if all(keeps[other, k] for k in group):
                 group.append(other)
-        if len(group) >= 3 and not _in_line(apart[np.ix_(group, group)]):
+        if len(group) >= 3 and not in_line(apart[np.ix_(group, group)]):
             found.append(tuple(sorted(group)))
             left -= set(group)
     return found
 
 
-def _in_line(apart: Array) -> bool:
+def rigid(x: Array, noise: float) -> bool:
+    """Whether markers (frames, markers, 3) keep their distances, up to the noise, m."""
+    distance = _distances(x)
+    return bool(np.all(np.nanstd(distance, axis=0) <= np.maximum(RIGID * noise, 1e-3 * np.nanmax(distance, axis=0))))
+
+
+def in_line(apart: Array) -> bool:
     """Whether three or more points with these distances are on one line, or almost: classical scaling."""
     n = len(apart)
     centered = np.eye(n) - 1.0 / n
@@ -259,7 +265,7 @@ def _up(recording: Recording) -> tuple[int, bool]:
     return (1 if spread[1] > 1.5 * spread[2] else 2), False
 
 
-def _is_sheet(x: Array, apart: Array, in_bodies: set[int]) -> bool:
+def is_sheet(x: Array, apart: Array, in_bodies: set[int]) -> bool:
     """Whether the markers have neighbors on all sides, or the shortest way through them turns back again and again.
     Those of a hand's body do not count."""
     if 2 * len(in_bodies) <= len(apart):

@@ -53,17 +53,19 @@ def restless(recording: Recording, noise: Array) -> Strangers | None:
     return _told(recording, found, "somewhere else in every frame, as reflections are, and left out")
 
 
-def of_the_room(recording: Recording, still: Array, distance: Array) -> Strangers | None:
+def of_the_room(recording: Recording, still: Array, distance: Array, noise: Array) -> Strangers | None:
     """Markers that stay in place, far from what moves, and that hold nothing.
 
     Args:
         still: (markers,) whether each stays in place.
         distance: (frames, markers, markers) m.
+        noise: (markers,) m, that of each, or not a number.
     """
     moving, resting = np.flatnonzero(~still), np.flatnonzero(still)
     if len(still) < FEWEST or not len(moving) or not len(resting):
         return None
-    mean, varies = np.nanmean(distance, axis=0), np.nanstd(distance, axis=0)
+    mean, own = np.nanmean(distance, axis=0), np.nan_to_num(noise) ** 2
+    varies = np.sqrt(np.maximum(np.nanvar(distance, axis=0) - own[:, None] - own, 0.0))
     moved = np.sqrt(np.nanvar(recording.positions, axis=0).sum(axis=1))
     among = mean[np.ix_(moving, moving)] + np.where(np.eye(len(moving), dtype=bool), np.inf, 0.0)
     alone = len(moving) == 1  # as the end of a pendulum
