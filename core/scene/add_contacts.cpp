@@ -4,7 +4,6 @@
 #include <cmath>
 #include <map>
 
-#include "core/scene/held_nodes.h"
 #include "core/scene/spec_checks.h"
 
 namespace sheetbend {
@@ -54,6 +53,16 @@ void check_contact(const ContactSpec& spec, const Scene& scene, std::vector<char
   check_carried(spec.name + ".carried", spec.carried, scene, carries);
 }
 
+// Per node, whether constraints hold it.
+std::vector<char> held_nodes(const Scene& s) {
+  std::vector<char> held(s.nodes(), false);
+  for (const Group& g : s.groups)
+    for (const int n : g.stencil) held[n] = true;
+  for (const Volume& v : s.volumes)
+    for (const int n : v.nodes) held[n] = true;
+  return held;
+}
+
 // Of contacts with restitution: the free particles that nothing holds, and which ones constraints hold. A soft contact of what is held gives back
 // by itself.
 void add_bouncers(const std::vector<char>& held, Scene& s) {
@@ -77,7 +86,8 @@ void add_bouncers(const std::vector<char>& held, Scene& s) {
 }
 
 // Their radii and their restitution stand behind all others.
-void add_balls(const std::vector<int>& nodes, std::size_t radii, std::size_t restitutions, Scene& s) {
+void add_balls(const std::vector<int>& nodes, const std::vector<char>& held, std::size_t radii,
+               std::size_t restitutions, Scene& s) {
   if (nodes.empty()) return;
   const std::string field = "collisions";
   check_nodes(field, nodes, s.nodes());
@@ -92,6 +102,7 @@ void add_balls(const std::vector<int>& nodes, std::size_t radii, std::size_t res
     if (s.role[n] != Role::free)
       refuse(particle + " is held. Fix: leave it out, and let the others touch a sphere there");
     s.balls.members.push_back({n, {}});
+    s.balls.held.push_back(held[n]);
   }
   for (Bouncer& own : s.bouncers)
     if (slot[own.node] >= 0) s.balls.members[slot[own.node]].contacts = std::move(own.contacts);
@@ -196,7 +207,7 @@ ContactSizes add_contacts(const SceneSpec& spec, Scene& s) {
   add_bouncers(held, s);
   add_self_contact(spec, weights, s, carries);
   const std::size_t radii = s.contacts.size() + spec.self_contact.pieces.size();
-  add_balls(spec.balls, radii, bouncing, s);
+  add_balls(spec.balls, held, radii, bouncing, s);
   return {s.contacts.size() + s.self_contact.rubs(),
           radii + s.balls.members.size(),
           soft,

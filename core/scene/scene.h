@@ -104,6 +104,7 @@ struct Bouncer {
 // Particles with a radius that hit each other.
 struct Balls {
   std::vector<Bouncer> members;
+  std::vector<char> held;        // likewise: whether constraints hold it
   std::size_t first_radius = 0;  // in Quantity::contact_radius, one for each
   int restitution = -1;          // place in Quantity::restitution
 

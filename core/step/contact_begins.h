@@ -2,7 +2,6 @@
 // start. By values, of which nothing is differentiated. A contact so soft that substeps follow its vibration is a force as others are, and does not count.
 #pragma once
 
-#include "core/scene/held_nodes.h"
 #include "core/step/step.h"
 
 namespace sheetbend {
@@ -57,12 +56,10 @@ Scenes where_contact_begins(const Step<T>& step, const InverseMasses<T>& masses,
 // Where a ball was hit that constraints hold. They pull it as if a contact had begun.
 template <class T>
 Scenes where_held_balls_hit(const Step<T>& step, const std::vector<Impact<Single<T>>>& impacts) {
-  if (impacts.empty()) return 0;
-  const std::vector<char> held = held_nodes(step.scene);
   Scenes hit = 0;
   for (const auto& impact : impacts)
     for (const auto& f : impact.flown())
-      if (held[f.node]) hit |= static_cast<Scenes>(1u << impact.lane);
+      if (f.ball >= 0 && step.scene.balls.held[f.ball]) hit |= static_cast<Scenes>(1u << impact.lane);
   return hit & step.scenes;
 }
 

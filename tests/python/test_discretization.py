@@ -195,7 +195,7 @@ def test_a_finer_mesh_is_counted_where_it_can_be_made_and_named_where_not(tmp_pa
     assert abs(EI.value - 2e-3) < 0.1 * abs(before.value - 2e-3) and EI.half_width < 4 * before.half_width
     found.save(tmp_path / "fit.json")
     assert sb.FitResult.load(tmp_path / "fit.json") == found.result
-    assert "and of fine meshes" in found.report()
+    assert "and fine meshes" in found.report()
     step = found.result.refits[-1]
     assert step.name == "finer mesh" and 0 < step.left["rope_EI"] < 0.3 * abs(step.to_limit * step.moved["rope_EI"])
 

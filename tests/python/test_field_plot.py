@@ -85,7 +85,7 @@ def test_what_gravity_pulls_at_hangs_down(gravity: tuple, axis: int, turned: boo
     assert (low > high) == turned
 
 
-@pytest.mark.parametrize(("fields", "problem"), [([], "empty"), ([Field("a", np.ones(3))], "shape")])
+@pytest.mark.parametrize(("fields", "problem"), [([], "at least one"), ([Field("a", np.ones(3))], "shape")])
 def test_what_is_refused(fields: list[Field], problem: str) -> None:
     with pytest.raises(sb.InputError, match=problem):
         plot_fields(MESH, fields)

@@ -18,7 +18,8 @@ from sheetbend.minimum import linear_algebra
 from sheetbend.minimum.linear_algebra import one_blas_thread
 from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.workers import Common, working_on
-from sheetbend.textile import Curve, fit_fabric, fit_pull, fit_tests
+from sheetbend.objects.fabric import Fabric
+from sheetbend.textile import Curve, FabricTests, fit_fabric, fit_pull, fit_tests
 from test_journal import swinging
 from test_workers import Backwards
 from threadpoolctl import threadpool_info, threadpool_limits
@@ -95,6 +96,13 @@ class Watched:
         raise Looked(blas_threads())
 
 
+class WatchedList(Watched, list[Any]):
+    """The same as a list of one thing."""
+
+    def __init__(self) -> None:
+        self.append(None)
+
+
 class WatchedCurve(Watched, Curve):
     """The same as a curve that has no numbers."""
 
@@ -102,19 +110,28 @@ class WatchedCurve(Watched, Curve):
         pass
 
 
-OTHERS: dict[str, Callable[[Any], Any]] = {
-    "fit_many": lambda watched: sb.fit_many(watched, ["rope_EI"]),
-    "fit_rope": lambda watched: fit_rope(watched, density=0.1, gravity=(0.0, 0.0, -9.81)),
-    "fit_pull": lambda _: fit_pull([WatchedCurve()]),
-    "fit_fabric": lambda watched: fit_fabric(watched, watched, ["warp"]),
-    "fit_tests": fit_tests,
+class WatchedTests(Watched, FabricTests):
+    """The same as tests of a fabric that were not done."""
+
+    def __init__(self) -> None:
+        pass
+
+
+OTHERS: dict[str, Callable[[], Any]] = {
+    "fit_many": lambda: sb.fit_many(Watched(), ["rope_EI"]),
+    "fit_rope": lambda: fit_rope(WatchedList(), density=0.1, gravity=(0.0, 0.0, -9.81)),
+    "fit_pull": lambda: fit_pull([WatchedCurve()]),
+    "fit_fabric": lambda: fit_fabric(
+        WatchedList(), Fabric(density=0.1, warp=100.0, shear=10.0, bending=1e-5), ["warp"]
+    ),
+    "fit_tests": lambda: fit_tests(WatchedTests()),
 }
 
 
 @pytest.mark.parametrize("name", OTHERS)
 def test_other_fits_use_one_thread(name: str) -> None:
     with pytest.raises(Looked) as found:
-        OTHERS[name](Watched())
+        OTHERS[name]()
     assert found.value.args == ({1},)
     assert blas_threads() == {HERE}
 

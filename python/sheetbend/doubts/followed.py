@@ -42,13 +42,13 @@ def followed(problem: FitProblem, u: Array, one: Wrong) -> Wrong:
     beyond = left * one.times / (1.0 + one.times)
     for cause in one.causes[:MOST_FITTED]:  # of one error each, where nothing explains nearly all
         ((told, size, _),) = cause.parts
-        free = _with_error(problem, one.motions[0], told, size)
-        if free is None:
-            continue
         try:
+            free = _with_error(problem, one.motions[0], told, size)
+            if free is None:
+                continue
             end = refit(free, np.append(u, size), "auto", ITERATIONS, TOLERANCE)
             ok, after, _ = free.evaluate(end.u, jacobian=False)
-        except SheetbendError:
+        except SheetbendError:  # also of an error that no scene can have, such as a drag below zero
             continue
         explained = (left - float(after[mine] @ after[mine])) / beyond
         if ok and explained > MOST:
