@@ -1,6 +1,5 @@
-// Loops of bodies, as two hinges of a door close one: rows of their joints follow from others where the bodies are as the joints let them. In the
-// prediction of a substep, which drag, loads and kept spins turn apart by some angle, such a row keeps the square of that angle of its own diagonal as
-// pivot, and would push with forces that nothing asks for. So a pivot counts as zero up to a larger share than in other blocks.
+// Loops of bodies, as two hinges of a door close one: some rows of their joints follow from others (loop_rows.h). In blocks that have one, a pivot counts
+// as zero up to a larger share than in others, since bodies stand apart by what a substep leaves.
 #pragma once
 
 #include <vector>

@@ -326,7 +326,9 @@ DirectBlock make_block(const Scene& scene, std::vector<Member> members, const So
   std::vector<BlockVolume> volumes = volumes_around(scene, members);
   Users users = number_rows(scene, members, volumes);
   for (const int node : loose) users.push_back({node, {}});
-  FactorStructure structure = condensed ? FactorStructure(0, {}) : structure_of(scene, members, volumes, users);
+  const bool loop = condensed && options.partition != Partition::implicit && closes_loop(scene, members);
+  FactorStructure structure = condensed ? FactorStructure(0, {}, true, loop ? pivot_of_loop : 0.0)
+                                        : structure_of(scene, members, volumes, users);
   if (!condensed && !structure.banded()) {
     order_for_low_fill(scene, members);
     users = number_rows(scene, members, volumes);

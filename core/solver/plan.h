@@ -65,7 +65,7 @@ struct DirectBlock {
   int movable = 0;
   bool damped = false;        // whether any of its groups is
   bool implicit = false;      // solved until its forces balance
-  FactorStructure structure;  // of its constraints' matrix; empty where it is condensed
+  FactorStructure structure;  // of its constraints' matrix; without rows where it is condensed
   std::optional<Condensation> condensation = {};
   std::vector<BlockVolume> volumes = {};
   std::vector<BlockContact> contacts = {};  // by first particle

@@ -4,6 +4,7 @@
 #include "core/scalar/complex.h"
 #include "core/scalar/dual.h"
 #include "core/scalar/pack.h"
+#include "core/solver/loop_rows.h"
 #include "core/solver/project_block.h"
 #include "core/solver/project_implicit.h"
 #include "core/step/stages.h"
@@ -66,6 +67,7 @@ void ProjectBlocks::forward(const Step<T>& step, Work<T>& work, Record<T>& recor
       damping_references(state, block, pack_kernels(), step.bdf.before, step.from, record.blocks[b]);
       load_contacts(
           block, [&](int lane) { return contact_source(step, work.masses, lane); }, *work.poses, record.blocks[b]);
+      let_loop_rows_give_way(state, block, pack_kernels(), step.from.x, record.blocks[b]);
       if (block.implicit)
         project_implicit(state, block, plan.options, step.from, step.scenes, pack_kernels(), record.blocks[b]);
       else

@@ -10,13 +10,9 @@ class RedundantConstraintsWarning(UserWarning):
     to their rest values are zero."""
 
 
-def warn_redundant(where: str, which: str, turning: bool = False) -> None:
+def warn_redundant(where: str, which: str) -> None:
     """Warn that a scene has such constraints; `which` is the core's description, empty where there are none. A row that
-    follows from no other is no such constraint: its pivot is lost in rounding, or no number.
-
-    Such a row is recognized where its constraints are fulfilled. With `newton` and `newton_cg` (`turning`) it is not
-    while drag or loads turn bodies apart within a substep.
-    """
+    follows from no other is no such constraint: its pivot is lost in rounding, or no number."""
     if not which:
         return
     if any(not part.partition("follows from")[2].strip() for part in which.split("; ") if "follows from" in part):
@@ -28,13 +24,9 @@ def warn_redundant(where: str, which: str, turning: bool = False) -> None:
             stacklevel=3,
         )
     else:
-        apart = (
-            "Where drag, loads or motors turn such bodies apart within a substep they are not recognized, and the "
-            "forces between them and gradients are wrong. "
-        )
         warnings.warn(
             f"{where}: rigid constraints that follow from others are left out: {which}. Their forces are zero, and "
-            f"their rest values have no effect. {apart if turning else ''}Fix: remove them, or give them a compliance",
+            "their rest values have no effect. Fix: remove them, or give them a compliance",
             RedundantConstraintsWarning,
             stacklevel=3,
         )

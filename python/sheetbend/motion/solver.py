@@ -175,8 +175,7 @@ class Solver:
         if self.method == "direct" or (
             self.method != "gauss_seidel" and not (inputs[offset : offset + size] > 0).all()
         ):
-            turning = "rigid" in scene.kinds and self.method in ("newton", "newton_cg")
-            warn_redundant(scene.name, core.redundant(inputs, 0.0), turning)
+            warn_redundant(scene.name, core.redundant(inputs, 0.0))
         return core
 
 
