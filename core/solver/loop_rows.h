@@ -57,23 +57,23 @@ std::vector<T> inverse_pivots_of_rigid(const BlockNumbers<T>& block, double leas
 template <class T>
 void let_loop_rows_give_way(const SubstepState<T>& s, const DirectBlock& block,
                             const sheetbend_packs::KernelTable& table, const T* x, BlockState<T>& state) {
-  const double least = block.structure.supernodes().least_pivot;
-  if (!(least > redundant_pivot)) return;
+  if (block.loop_pivot == 0.0) return;
   fill_values(s, block, state);
   load_coordinates(s.scene, block, x, state.x[0]);
   const auto& kernels = forward_kernels<Plain<T>>(table);
   kernels.evaluate(arrays_of(block, runs_of(s, block, state), state, 0));
   evaluate_volumes(s.scene, s.inputs, block, state, 0);
-  std::vector<Plain<T>> inverse;
+  const auto give_way = [&](const std::vector<Plain<T>>& inverse) {
+    for (int row = 0; row < block.size(); ++row) {
+      const T D = state.diagonal[row];
+      state.diagonal[row] = select(inverse[row] > Plain<T>(0.0), D, T(beyond_all));
+    }
+  };
   if (block.condensation) {
-    inverse = inverse_pivots_of_rigid(numbers_of_block(block, state, 0), least);
+    give_way(inverse_pivots_of_rigid(numbers_of_block(block, state, 0), block.loop_pivot));
   } else {
     factor_sparse(block, kernels, state, 0);
-    inverse = state.at(0).factor.inverse;
-  }
-  for (int row = 0; row < block.size(); ++row) {
-    const T D = state.diagonal[row];
-    state.diagonal[row] = select(inverse[row] > Plain<T>(0.0), D, T(beyond_all));
+    give_way(state.at(0).factor.inverse);
   }
   load_coordinates(s.scene, block, s.q, state.x[0]);
 }

@@ -65,16 +65,15 @@ std::vector<BlockVolume> volumes_around(const Scene& scene, const std::vector<Me
 
 // Every pair of rows that share a movable node.
 FactorStructure structure_of(const Scene& scene, const std::vector<Member>& members,
-                             const std::vector<BlockVolume>& volumes, const Users& users) {
+                             const std::vector<BlockVolume>& volumes, const Users& users, double loop_pivot) {
   std::vector<std::pair<int, int>> entries;
   for (const auto& [node, rows] : users)
     for (const int row : rows)
       for (const int column : rows)
         if (column <= row) entries.emplace_back(row, column);
   const int rows = members.back().first_row + scene.groups[members.back().group].rows;
-  const bool loop = closes_loop(scene, members);
-  return {rows + static_cast<int>(volumes.size()), entries, volumes.empty() && !loop,
-          loop ? pivot_of_loop : redundant_pivot};
+  return {rows + static_cast<int>(volumes.size()), entries, volumes.empty() && loop_pivot == 0.0,
+          std::max(loop_pivot, redundant_pivot)};
 }
 
 // A particle of the block, with the rows that it takes part in. Windows of a band have no gaps: rows between that do not touch the particle
@@ -326,17 +325,19 @@ DirectBlock make_block(const Scene& scene, std::vector<Member> members, const So
   std::vector<BlockVolume> volumes = volumes_around(scene, members);
   Users users = number_rows(scene, members, volumes);
   for (const int node : loose) users.push_back({node, {}});
-  const bool loop = condensed && options.partition != Partition::implicit && closes_loop(scene, members);
-  FactorStructure structure = condensed ? FactorStructure(0, {}, true, loop ? pivot_of_loop : 0.0)
-                                        : structure_of(scene, members, volumes, users);
+  const bool implicit = options.partition == Partition::implicit;
+  const double loop_pivot = !implicit && closes_loop(scene, members) ? pivot_of_loop : 0.0;
+  FactorStructure structure =
+      condensed ? FactorStructure(0, {}) : structure_of(scene, members, volumes, users, loop_pivot);
   if (!condensed && !structure.banded()) {
     order_for_low_fill(scene, members);
     users = number_rows(scene, members, volumes);
-    structure = structure_of(scene, members, volumes, users);
+    structure = structure_of(scene, members, volumes, users, loop_pivot);
   }
   DirectBlock block{std::move(members), {}, {}, {0}, {}, {}, {}, 0, false, false, std::move(structure)};
   block.volumes = std::move(volumes);
-  block.implicit = options.partition == Partition::implicit;
+  block.implicit = implicit;
+  block.loop_pivot = loop_pivot;
   if (condensed) block.condensation.emplace();  // to be filled in: it has no band
   std::map<int, int> particle_of;
   for (const auto& [node, rows] : users) {

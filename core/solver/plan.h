@@ -65,12 +65,13 @@ struct DirectBlock {
   int movable = 0;
   bool damped = false;        // whether any of its groups is
   bool implicit = false;      // solved until its forces balance
-  FactorStructure structure;  // of its constraints' matrix; without rows where it is condensed
+  FactorStructure structure;  // of its constraints' matrix; empty where it is condensed
   std::optional<Condensation> condensation = {};
   std::vector<BlockVolume> volumes = {};
   std::vector<BlockContact> contacts = {};  // by first particle
   std::vector<BlockFrame> frames = {};      // of implicit blocks, normals first
   SelfContact surface = {};                 // in the block's order, fixed particles included
+  double loop_pivot = 0.0;  // if it closes a loop of bodies: below which a pivot counts as zero (loop_rows.h)
 
   int size() const { return static_cast<int>(multipliers.size()); }
   bool may_slide() const { return !contacts.empty() || surface.rubs(); }  // something, with friction

@@ -62,7 +62,7 @@ def places_or_none(scene: SceneData, rows: Sequence[Sequence[int | None]]) -> np
 
 def _has_means(scene: SceneData) -> bool:
     """Also of a scene that was read from a file: `coincide` holds nodes at means, and otherwise two bodies together."""
-    centers = [nodes[0] for nodes in scene.with_axes]  # the ground's too, which means hang on
+    centers = [own for own, *_ in scene.with_axes if own is not None]  # the ground's too, which means hang on
     seconds = [g.particles[:, 1] for g in scene.groups if g.kind == "coincide" and centers]
     return not all(np.isin(nodes, centers).all() for nodes in seconds)
 
