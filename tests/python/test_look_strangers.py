@@ -653,7 +653,11 @@ def test_other_things_beside_a_rope(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         scenes.append(tomllib.loads(Path(f"{name}.toml").read_text())["scene"])
     assert scenes[0] == scenes[1] == scenes[2]
     refused = run("new", "two.csv", "-o", "none.toml")
-    assert refused.exit_code == 2 and "--markers 'r0,r1,r2," in refused.output and "two ropes" in refused.output
+    assert (
+        refused.exit_code == 2
+        and "--markers 'r*' or --markers 's*'" in refused.output
+        and "two ropes" in refused.output
+    )
     wrong = run("new", "two.csv", "-o", "none.toml", "--markers", "r*, q*")
     assert wrong.exit_code == 2 and "(got 'q*')" in wrong.output
 
