@@ -114,8 +114,7 @@ def _steps(result: FitData) -> Iterator[str]:
     """What to do, the most urgent first."""
     first = [*_before_use(result)]
     yield from first
-    held_out = [*(r.held_out for r in result.recordings), *(f.held_out for f in result.forces)]
-    if all(h is None for h in held_out):
+    if not _held_out(result):
         yield "hold out a part of the data (`held_out`), to see how well the model predicts"
     if not first:
         yield "use the values with their intervals" + (", after you have read the warnings" if result.warnings else "")
