@@ -7,10 +7,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import sheetbend as sb
-from sheetbend.doubts.absent_yield import AT, SHARE, deformed, elastic_names, with_free_yield, with_yield
+from sheetbend.doubts.absent_bounce import with_free_bounce
+from sheetbend.doubts.absent_damping import with_free_damping
+from sheetbend.doubts.absent_yield import (
+    AT,
+    SHARE,
+    deformed,
+    elastic_names,
+    held_stiffness,
+    with_free_yield,
+    with_yield,
+)
 from sheetbend.doubts.other_losses import other_losses
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.problem import FitProblem
+from sheetbend.quantities.quantities import term
 
 SIGMA, TIMES = 3e-4, np.arange(61) / 60
 TRUTH = {"cloth_bending": 1e-4, "cloth_bend_damping": 0.02}
@@ -65,6 +76,36 @@ def test_a_model_with_yield_moves_as_one_that_was_built_with_it() -> None:
     assert ok and np.abs(there - r).max() < 1e-9 and np.linalg.norm(J, axis=0).min() > 1.0
     assert 1.0 < deformed(problem, u, "cloth_bend") < 10.0  # 1/m
     assert np.mean(problem.evaluate(u, jacobian=False)[1] ** 2) > 3.0
+
+
+def test_a_stiffness_that_is_given_is_to_be_fitted_first() -> None:
+    """With three times its bending a sheet looks as if it yielded, since the half that slides lowers the stiffness."""
+    e = filmed()
+    for name in ("cloth_bend_damping", "cloth_bending", "cloth_shear"):
+        problem = FitProblem([e], as_parameters([name], [e]))
+        given = {"cloth_bend": ["cloth_bending"], "cloth_membrane": ["cloth_warp", "cloth_weft", "cloth_shear"]}
+        fitted = {"cloth_bending": "cloth_bend", "cloth_shear": "cloth_membrane"}.get(name, "")
+        for group, names in given.items():
+            assert held_stiffness(problem, group) == ([] if group == fitted else names)
+
+
+def test_quantities_of_a_user_keep_their_values_beside_those_that_are_tried() -> None:
+    """A quantity of a scene that was named as one of these took its value; a fitted one ended the fit."""
+    e, names = filmed(), ("sliding_share", "sliding_at", "damping", "restitution")
+    scene, at = flag(membrane_damping=None)
+    for k, name in enumerate(names):
+        scene.add_quantity(name, 1e-4, "kg")
+        scene.add_terms([term("mass", at[-1 - k], 1.0, **{name: "identity"})])
+    scene.add_contact(at, sb.Plane(name="table", point=(0, 0, -9)), friction=0.3, radius=1e-3)
+    e = replace(e, scene=scene.freeze(), solver=sb.Solver(h=1 / 300, method="implicit"))
+    problem = FitProblem([e], as_parameters(["sliding_at", "damping", "restitution"], [e]))
+    u = problem.parameters.initial()
+    free = [with_free_yield(problem, "cloth_bend", 2.0), with_free_bounce(problem), with_free_damping(problem, u, "")]
+    for more in free:
+        quantities = more.experiments[0].scene.quantities
+        assert len(quantities) > len(scene.quantities)
+        assert all(quantities[name] == scene.quantities[name] for name in names)
+        assert more.parameters.free[:3] == problem.parameters.free and more.parameters.free[-1].startswith("[")
 
 
 def test_a_motion_that_is_extrapolated_is_given_no_yield() -> None:

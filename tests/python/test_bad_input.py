@@ -161,6 +161,7 @@ SCENE = {
         "links_compliance",
         after(lambda s: s.add_quantity("links_compliance", 1.0, "m/N"), scene=linked),
     ),
+    "quantity of a name that fits use": ("[damping]", lambda: three().add_quantity("[damping]", 1.0, "s")),
     "quantity not finite": ("q", lambda: three().add_quantity("q", NAN, "m")),
     "quantity not positive": ("q", lambda: three().add_quantity("q", 0.0, "m")),
     "term of an unknown quantity": (

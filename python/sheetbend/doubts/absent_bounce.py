@@ -16,7 +16,7 @@ from ..quantities.parameters import Parameter
 from ..quantities.quantities import Quantity, Term
 from .more_parameters import with_parameter
 
-RESTITUTION = Parameter(name="restitution", initial=0.5, lower=0.0, upper=1.0, scale=0.1)
+RESTITUTION = Parameter(name="[restitution]", initial=0.5, lower=0.0, upper=1.0, scale=0.1)
 SIZES = tuple(k / 10 for k in range(1, 10))
 
 

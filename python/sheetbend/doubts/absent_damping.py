@@ -18,7 +18,7 @@ from ..quantities.quantities import Quantity, Term
 from ..scene.scene import Scene
 from .more_parameters import with_parameter
 
-DAMPING = Parameter(name="damping", initial=1.0, log=True)  # in intervals between frames
+DAMPING = Parameter(name="[damping]", initial=1.0, log=True)  # in intervals between frames
 FRAMES = (1 / 3, 1.0, 3.0)  # intervals between frames: the time constants that are tried
 
 

@@ -8,7 +8,7 @@ beyond some parts of how far the fitted motion deforms.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -33,9 +33,10 @@ YIELDING = {
     "material_curvature": ("yielding_curvature", slice(0, 2)),
     "section_curvature": ("section_yielding_curvature", slice(0, 2)),
 }  # by elastic kind, the one that yields, and which of its rows slide
+STIFFNESS = ("inverse", "sqrt", "inverse_sqrt")  # functions of a stiffness in these
 HALF = 0.5
-SHARE = Parameter(name="sliding_share", initial=HALF, lower=0.0, upper=0.95, scale=0.1)  # of the stiffness
-AT = Parameter(name="sliding_at", initial=1.0, log=True)  # the deformation beyond which it slides
+SHARE = Parameter(name="[sliding_share]", initial=HALF, lower=0.0, upper=0.95, scale=0.1)  # of the stiffness
+AT = Parameter(name="[sliding_at]", initial=1.0, log=True)  # the deformation beyond which it slides
 PARTS = (0.3, 1.0, 2.0)  # of the root mean square of what slides, over the fitted motion
 FRAMES = 9  # of the motion, at which this is asked
 
@@ -44,6 +45,24 @@ def elastic_names(motions: Sequence[Experiment]) -> list[str]:
     """Names of the groups that could yield and do not."""
     groups = [g for e in motions if _may_yield(e) for g in e.scene.groups]
     return list(dict.fromkeys(g.name for g in groups if g.kind in YIELDING))
+
+
+def held_stiffness(problem: FitProblem, name: str) -> list[str]:
+    """Names of what makes the stiffness of a group that could yield, where no free parameter is among them."""
+    found = {q: None for e in problem.experiments if _may_yield(e) for q in _stiffness(e.scene, name)}
+    free = {problem.parameters.roots[parameter][0].partition("[")[0] for parameter in problem.parameters.free}
+    return [] if free & found.keys() else list(found)
+
+
+def _stiffness(scene: Scene, name: str) -> Iterator[str]:
+    """Names of the quantities that are a stiffness in the compliance or the numbers of a group."""
+    first = {"compliance": 0, "rest": 0}
+    for g in scene.groups:
+        size = {"compliance": len(g.particles), "rest": g.rest.size}
+        for t in scene.terms if g.name == name else ():
+            if t.array in first and 0 <= int(np.ravel(t.index)[0]) - first[t.array] < size[t.array]:
+                yield from (q for q, function in t.factors if function in STIFFNESS)
+        first = {array: start + size[array] for array, start in first.items()}
 
 
 def deformed(problem: FitProblem, u: Array, name: str) -> float:

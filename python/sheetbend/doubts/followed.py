@@ -24,7 +24,7 @@ from .tangents import inputs_of
 from .told import Told
 from .told_words import words_of
 
-NAME = "error"
+NAME = "[error]"
 MOST_FITTED = 2  # causes
 ITERATIONS, TOLERANCE = 15, 1e-4  # at most, and of the cost where a search ends
 

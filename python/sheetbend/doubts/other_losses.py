@@ -33,7 +33,7 @@ from ..statistics.least_squares import solved, spanned
 from .absent_bounce import SIZES as BOUNCES
 from .absent_bounce import has_no_bounce, with_bounce, with_free_bounce
 from .absent_damping import FRAMES, undamped, with_damping, with_free_damping
-from .absent_yield import HALF, PARTS, deformed, elastic_names, with_free_yield, with_yield
+from .absent_yield import HALF, PARTS, deformed, elastic_names, held_stiffness, with_free_yield, with_yield
 from .directions import LEVEL, chance_of_drop, noise_in, rows_of, tied
 from .held_losses import held_names, of_size
 from .losses_at_zero import touches
@@ -184,7 +184,8 @@ def _yields(problem: FitProblem, u: Array, J: Array, groups: list[_Group]) -> It
                 for part in PARTS
                 if _promises(more := with_yield(problem, name, part * size), u, q, groups)
             ]
-            yield from _of_sizes(sizes, with_free_yield(problem, name, size), _lacks_yield(name), u, None, groups)
+            free, says = with_free_yield(problem, name, size), _lacks_yield(problem, name)
+            yield from _of_sizes(sizes, free, says, u, None, groups)
 
 
 def _promises(more: FitProblem, u: Array, q: Array, groups: list[_Group]) -> bool:
@@ -260,12 +261,14 @@ def _lacks_damping(only: str) -> Says:
     )
 
 
-def _lacks_yield(name: str) -> Callable[[Array], Says]:
+def _lacks_yield(problem: FitProblem, name: str) -> Callable[[Array], Says]:
+    held = held_stiffness(problem, name)
+    first = f"Fit {', '.join(held)} first: if the given value is too large, it looks alike. If not" if held else "Then"
     return lambda _: (
         lambda names, less: (
             f"{names[0] if len(names) == 1 else 'the recordings'} may lose energy by friction inside {name}: with a "
-            f"share of its stiffness that slides the fit {less}. If its stiffness is given, fit that first: a "
-            "smaller one may look alike. Else give it a yield (such as yield_curvature and yield_share), and fit it"
+            f"share of its stiffness that slides the fit {less}. {first}, give it a yield (such as yield_curvature and "
+            "yield_share), and fit it"
         )
     )
 

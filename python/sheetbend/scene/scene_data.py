@@ -92,9 +92,12 @@ class SceneData:
             shared: it may be there already, with the same value.
 
         Raises:
-            SceneError: the name is taken, or the value is not finite (or not positive where it must be).
+            SceneError: the name is taken or starts with a bracket, or the value is not finite (or not positive where
+                it must be).
         """
         self._building()
+        if isinstance(name, str) and name.startswith("["):
+            raise SceneError(name, "starts with a bracket, as what a fit tries by itself does", value, "leave it out")
         quantity = Quantity(name, value, unit, positive, scale, limits, beyond, unsure)
         before = self.quantities.setdefault(name, quantity)
         if before is quantity or (shared and before == quantity):
