@@ -181,13 +181,17 @@ def _collect(
         unit = GROUPS[error.name][0]
         one = Told(i, error.name, error.label, unit, error.step, error.column, relative=not unit)
         yield replace(one, missing=error.says, signed=True)
-    yield from _observe(problem, i, e, r, corrected, own, by_gravity, sticking)
+    if not e.is_cloud:
+        yield from _observe(problem, i, e, r, corrected, own, by_gravity, sticking)
 
 
 def _step(q: Quantity, value: float, log: bool) -> tuple[bool, float, str] | None:
     """Whether the step of a told quantity is relative, the step, and the step in words; None where none makes sense."""
     if log:
-        return True, q.unsure, f"{100 * q.unsure:g} %"
+        unsure = max(q.unsure, ESTIMATED if q.name.endswith((*LOSSES, "_friction")) else 0.0)
+        return True, unsure, f"{100 * unsure:g} %"
+    if q.name.endswith(("_poisson", "_restitution")):
+        return False, GUESSED, f"{GUESSED:g}"
     if q.name.startswith(WIND):
         return (False, *GROUPS["draft"][1])
     if q.unit in STEPS:

@@ -22,7 +22,7 @@ from ..doubts.prediction import predicted_values
 from ..doubts.profiles import Elsewhere
 from ..doubts.spin import spins_otherwise
 from ..doubts.stuck import bounded_by_sticking
-from ..doubts.told import Told
+from ..doubts.told import Told, told_numbers
 from ..doubts.unstable import unstable_rests
 from ..doubts.wrong_given import doubts_of, explained_by, wrong_in_either
 from ..doubts.wrong_given import warnings_of as wrong_given_warnings
@@ -34,7 +34,7 @@ from ..quantities.parameters import Parameters
 from ..result.bootstrap import Bootstrap
 from ..result.estimate import Given, Premise
 from ..statistics.identifiability import Identifiability
-from .clouds import driven_beside_clouds, told_beside_clouds
+from .clouds import driven_beside_clouds
 from .reached import Reached
 
 IGNORED = ", and their standard deviations do not count"
@@ -100,7 +100,7 @@ def conclude(
     """
     problem, best, lost = reached.problem, reached.best, reached.lost
     at, compared = settled(asked.refinement, experiments, problem, best, refitter)
-    told, silent = ([], "") if refitter is None or lost else told_beside_clouds(at.problem, at.u)
+    told, silent = ([], "") if refitter is None or lost else told_numbers(at.problem, at.u)
     rests_on = premises(at.problem, at.u, asked.given, told)
     more = dict(half_widths(rests_on, problem.parameters.free))
     for parameter, half_width in ({} if asked.systematic is None else asked.systematic(at.problem, at.u)).items():
