@@ -263,11 +263,11 @@ def _lacks_damping(only: str) -> Says:
 
 def _lacks_yield(problem: FitProblem, name: str) -> Callable[[Array], Says]:
     held = held_stiffness(problem, name)
-    first = f"Fit {', '.join(held)} first: if the given value is too large, it looks alike. If not" if held else "Then"
+    first = f"Fit {', '.join(held)} first: too large a given value looks alike. If not, give" if held else "Give"
     return lambda _: (
         lambda names, less: (
             f"{names[0] if len(names) == 1 else 'the recordings'} may lose energy by friction inside {name}: with a "
-            f"share of its stiffness that slides the fit {less}. {first}, give it a yield (such as yield_curvature and "
+            f"share of its stiffness that slides the fit {less}. {first} it a yield (such as yield_curvature and "
             "yield_share), and fit it"
         )
     )
