@@ -107,9 +107,10 @@ def _kind(s: Seen, group: Group) -> str:
 
 
 def _is_sheet(s: Seen, group: Group) -> bool:
-    in_bodies = {k for body in s.bodies for k in body}
-    own = {i for i, k in enumerate(group) if k in in_bodies}
-    return is_sheet(s.recording.positions[:, list(group)], s.apart[np.ix_(group, group)], own)
+    place = {k: i for i, k in enumerate(group)}
+    bodies = [own for body in s.bodies if (own := [place[k] for k in body if k in place])]
+    still = [place[k] for k in s.still if k in place]
+    return is_sheet(s.recording.positions[:, list(group)], s.apart[np.ix_(group, group)], bodies, still)
 
 
 def _on_its_own(
