@@ -113,7 +113,7 @@ def seen(recording: Recording, up: str | None = None) -> Seen:
     moved = np.sqrt(np.nanmean(np.sum((x - center) ** 2, axis=2), axis=0)) if len(t) > 1 else np.zeros(count)
     _check_together(recording)
     _check_rate(recording)
-    distance = _distances(x)
+    distance = distances(x)
     # by each one's own noise: marks of the room make the extent large, and may be noisier
     stays = moved <= (STILL * np.fmax(each, noise) if noise else SILENT * extent)
     if (found := strangers.of_the_room(recording, stays, distance, each)) is not None:
@@ -182,7 +182,7 @@ def _above(frames: int) -> float:
     return float(np.sqrt(2.0)) * NormalDist().inv_cdf((rank - 0.375) / (frames + 0.25))
 
 
-def _distances(x: Array) -> Array:
+def distances(x: Array) -> Array:
     """(frames, markers, markers) m, of so many frames that the array stays small."""
     most = max(60, 4_000_000 // x.shape[1] ** 2)
     some = x[np.linspace(0, len(x) - 1, min(len(x), most)).astype(int)]
@@ -209,7 +209,7 @@ def _bodies(keeps: Array, apart: Array, still: Array) -> list[tuple[int, ...]]:
 
 def rigid(x: Array, noise: float) -> bool:
     """Whether markers (frames, markers, 3) keep their distances, up to the noise, m."""
-    distance = _distances(x)
+    distance = distances(x)
     return bool(np.all(np.nanstd(distance, axis=0) <= np.maximum(RIGID * noise, 1e-3 * np.nanmax(distance, axis=0))))
 
 
