@@ -11,7 +11,7 @@ import sheetbend as sb
 from sheetbend.gripped import GrippedMotion, fit_rope
 from sheetbend.gripped.judging import predict
 from sheetbend.gripped.report import counted
-from sheetbend.gripped.stiffness import stiffness_section, tangent_stiffness
+from sheetbend.gripped.stiffness import softest_place, stiffness_section, tangent_stiffness
 from sheetbend.report.fit_result import FitResult
 from sheetbend.result.estimate import Correlation, Estimate
 from test_cli_gripped import result_of
@@ -69,6 +69,42 @@ class TestTangent:
     def test_an_elastic_rope_has_one(self) -> None:
         elastic = replace(result(0.0), estimates=(estimate("EI", 0.2, 0.02),))
         assert tangent_stiffness(elastic) is None and stiffness_section(elastic) is None
+
+
+class TestSoftestPlace:
+    """A soft place at 0.4 of the length, EI exp(-0.8) there, as six modes show it."""
+
+    MODES = np.arange(1, 7)
+    SOFTNESS = 0.9 * np.cos(np.pi * MODES * 0.4) * np.exp(-((MODES / 5.0) ** 2))
+
+    def kinked(self, half: float | None = 0.05, size: float = 1.0) -> FitResult:
+        modes = [estimate(f"softness_{k}", size * x, half) for k, x in zip(self.MODES, self.SOFTNESS, strict=True)]
+        return replace(result_of(), estimates=(estimate("EI", 0.2, 0.02), *modes), correlations=())
+
+    def test_it_is_where_the_modes_add_up(self) -> None:
+        found = softest_place(self.kinked())
+        assert found is not None
+        place, (value, lower, upper) = found
+        assert place == pytest.approx(0.4, abs=0.03)
+        waves = np.cos(np.pi * self.MODES * place)
+        assert value == pytest.approx(0.2 * math.exp(-waves @ self.SOFTNESS))
+        reach = math.hypot(math.log(1.1), 0.05 * float(np.linalg.norm(waves)))
+        assert (lower, upper) == pytest.approx((value * math.exp(-reach), value * math.exp(reach)))
+
+    def test_correlations_of_its_modes_count(self) -> None:
+        pair = Correlation(first="rope_softness_1", second="rope_EI", value=0.9)
+        apart, together = softest_place(self.kinked()), softest_place(replace(self.kinked(), correlations=(pair,)))
+        assert apart is not None and together is not None and apart[1][1] is not None and together[1][1] is not None
+        assert together[1][1] > apart[1][1]  # where ln EI less the first mode is known better than either
+
+    def test_the_report_says_where(self) -> None:
+        section = stiffness_section(self.kinked())
+        assert section is not None and section.rows[1][0].startswith("EI at 0.4")
+        assert "of the free length from its start" in section.notes[0][1] and "kink" in section.notes[0][1]
+
+    @pytest.mark.parametrize(("half", "size"), [(1.0, 1.0), (None, 1.0), (0.05, 0.01)])
+    def test_one_that_is_not_known_is_not_named(self, half: float | None, size: float) -> None:
+        assert softest_place(self.kinked(half, size)) is None and stiffness_section(self.kinked(half, size)) is None
 
 
 class TestMarkerMass:

@@ -75,7 +75,7 @@ def _ratio(
     values = inputs[scene.compiled.layout["rest"][0] + at]
 
     def says(size: float) -> str:
-        how = "stiffer" if size > 0 else "softer"
-        return f"{second} of {prefix} were {short(100 * abs(np.expm1(size)), 2)} % {how} than its {first} ({second})"
+        how = "larger" if size > 0 else "smaller"
+        return f"{prefix}_{second} were {short(100 * abs(np.expm1(size)), 2)} % {how} than {prefix}_{first}"
 
-    yield Alike(f"{prefix}_{second} over {first}", [("rest", at, 0.5 * values)], says)
+    yield Alike(f"{prefix}_{second}/{prefix}_{first}", [("rest", at, 0.5 * values)], says)

@@ -56,7 +56,7 @@ relative) and step."""
 ESTIMATED, GUESSED = 0.1, 0.05
 """Step of a given loss or friction, relative, and of Poisson's ratio or a restitution: numbers that are rather
 estimated than measured. A Poisson's ratio of 0.3, told as 0.45, made the E of a swinging bar 10 % too large."""
-LATER, SLOWER, LARGER = "frames later", "clock", "size of the recording"
+LATER, SLOWER, LARGER = "recording delay", "frame rate", "size of the recording"
 ASIDE, DRAFT, BESIDE = "place of the drive", "draft along", "offset of markers"
 _NONE = np.zeros(0)
 

@@ -20,7 +20,11 @@ def words_of(one: Told, more: float, problem: FitProblem, group: Sequence[int]) 
     sign = "more" if more > 0 else "less"
     axis = f"{'' if more > 0 else '-'}{one.label.rsplit(' ', 1)[-1]}"
     if one.label == SIZE:
-        return f"gravity were {size} {'larger' if more > 0 else 'smaller'}"
+        alike = ""
+        if e.scene.boundary.following:  # its frame rate moves all that is measured, and has no direction of its own
+            rate = f"{short(abs(50 * more), 2)} % too {'short' if more > 0 else 'long'}"
+            alike = f" (times of the recording that are {rate} look alike: its frame rate)"
+        return f"gravity were {size} {'larger' if more > 0 else 'smaller'}{alike}"
     if one.label == LATER and e.scene.boundary.driven:
         when = f"{short(1e3 * abs(more), 2)} ms {'early' if more > 0 else 'late'}"
         return f"the clock of the recording{of} were {when} against that of what drives the scene (time_offset)"

@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays.timeseries import mean_position
 from .hand import LEAD_SD, SHIFT_SD, TILT_SD, entry
 from .line import chain, plane, snapped, tangent
-from .seen import CALM, Seen, motion_of
+from .seen import CALM, Seen, fixtures, motion_of
 from .text import joined
 
 Array = np.ndarray
@@ -66,6 +66,7 @@ def parts(s: Seen) -> tuple[Hands, tuple[int, ...]]:
     known = named(s)
     away = {k for b in s.bodies if not known & set(b) and _away(s, b) for k in b}
     near_rope = [b for b in s.bodies if not away & set(b)]
+    near_rope += [] if s.static else fixtures(s.apart, s.still)
     hands = [b for b in near_rope if known & set(b)] or [b for b in near_rope if count - len(away) - len(b) >= 3]
     chosen = _at_the_ends(s, hands, away)
     order = _rest(s, chosen, away)
@@ -268,10 +269,11 @@ def _of_hand(s: Seen, hand: tuple[int, ...], found: Held, held_before: Sequence[
     if at in held_before:
         at, k = ("end", order[-1]) if at == "start" else ("start", order[0])
     name, all_of = r.markers[k], joined(r.markers[j] for j in hand)
+    how = "stay in place, on a body" if set(hand) <= set(s.still) else "move as one rigid body,"
     where = entry(s, hand, order if at == "start" else order[::-1])
     grip: dict[str, Any] = {"at": at, "markers": [r.markers[j] for j in hand], "position": where.place}
     if where.lead:
-        found.notes.append(f"{all_of} move as one rigid body, which holds the rope some {where.lead:.2g} m from {name}")
+        found.notes.append(f"{all_of} {how} which holds the rope some {where.lead:.2g} m from {name}")
         found.unknown.append(
             f"where the rope leaves the hand, and in which direction: as the next markers swing, {where.lead:.2g} "
             f"m from {name}. Both are fitted: the whole rope is rope_length + rope_{at}_lead long. Measure the length "
@@ -283,7 +285,7 @@ def _of_hand(s: Seen, hand: tuple[int, ...], found: Held, held_before: Sequence[
         found.priors |= {f"{at}_shift_{j}": SHIFT_SD * where.lead for j in (1, 2)}
         found.priors[f"{at}_lead"] = LEAD_SD * where.lead
     else:
-        found.notes.append(f"{all_of} move as one rigid body, which holds the rope near {name}")
+        found.notes.append(f"{all_of} {how} which holds the rope near {name}")
         found.unknown.append(
             f"in which direction the rope leaves the hand, and where: that of its first markers, at {name}"
         )

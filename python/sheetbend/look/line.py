@@ -10,6 +10,7 @@ from ..arrays.shortest_tree import tree
 
 Array = np.ndarray
 SHORTER = 0.9  # of the length through the markers in the file's order: another order counts only if it is so short
+TURNED = 0.8  # of the way over three neighbors: how far apart the outer ones are where a line turns by 74 degrees
 AXIS, FLAT = 0.97, 0.02  # cosine of the angle to an axis that is taken for it; share of a length that is flat
 
 
@@ -30,6 +31,12 @@ def chain(apart: Array, markers: tuple[int, ...]) -> tuple[int, ...]:
         if length(tuple(order)) < SHORTER * length(best):
             best = tuple(order)
     return best
+
+
+def turns_sharply(apart: Array, order: tuple[int, ...]) -> bool:
+    """Whether a line through three or more markers turns back somewhere, as no rope between them does."""
+    threes = zip(order[:-2], order[1:-1], order[2:], strict=True)
+    return any(apart[a, c] < TURNED * (apart[a, b] + apart[b, c]) for a, b, c in threes)
 
 
 def forks(apart: Array, order: tuple[int, ...]) -> tuple[list[int], float]:

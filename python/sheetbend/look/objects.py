@@ -15,7 +15,7 @@ import numpy as np
 from ..arrays.shortest_tree import tree
 from ..errors import RecordingError
 from .held import gripping
-from .seen import Seen, in_line, is_sheet, rigid
+from .seen import RIGID, Seen, distances, fixtures, in_line, is_sheet, rigid
 from .text import joined
 
 Array = np.ndarray
@@ -34,10 +34,12 @@ def check_one_object(s: Seen) -> None:
     """Refuse a recording of several objects that no model joins; several cloths are drafted together.
 
     Raises:
-        RecordingError: the markers are those of several ropes, beams or bodies, or of a rope and a cloth.
+        RecordingError: the markers are those of several ropes, beams, bodies or pendulums, or of a rope and a cloth.
     """
     if s.static:
+        _check_one_at_rest(s)
         return
+    _check_one_pivot(s)
     groups = _groups(s)
     kinds = {group: _kind(s, group) for group in groups}
     objects = _parted(s, [group for group in groups if kinds[group] == "bends"])
@@ -57,14 +59,47 @@ def check_one_object(s: Seen) -> None:
     if len(objects) < 2 or (sheets and all(sheets)):
         return
     whole = _with_holders(s, objects, groups)
-    names = s.recording.markers
-    fix = "draft one at a time, with --markers " + " or --markers ".join(f"'{_pattern(names, own)}'" for own in whole)
+    more = ""
     if "one" in what:
-        fix += "; of one rope, record markers between them"
+        more = "; of one rope, record markers between them"
     if "bodies" in what:
-        fix += "; of bodies on a hinge, write the configuration by hand, see docs/configuration.md"
-    got = "; and ".join(joined(names[k] for k in own) for own in whole)
-    raise RecordingError("markers", f"are those of {COUNTS.get(len(objects), len(objects))} {what}", got, fix)
+        more = "; of bodies on a hinge, write the configuration by hand, see docs/configuration.md"
+    raise _several(s, whole, what, more)
+
+
+def _check_one_at_rest(s: Seen) -> None:
+    """Refuse several ropes at rest; markers on what holds a rope lie on no line."""
+    groups = _groups(s)
+    lines = [group for group in groups if not fixtures(s.apart, group)]
+    if len(lines) > 1 and not any(_is_sheet(s, group) for group in groups):
+        what = "ropes at rest, or of one with a long part that no marker shows"
+        raise _several(s, _with_holders(s, lines, groups), what, "; of one rope, record markers between them")
+
+
+def _check_one_pivot(s: Seen) -> None:
+    """Refuse several pendulums: all that moves keeps its distance from something that stays, and not from the others.
+
+    Of one pendulum with several arms, the outer ones do not keep it from what stays.
+    """
+    moving = [k for k in range(len(s.recording.markers)) if k not in s.still]
+    keeps = np.nanstd(distances(s.recording.positions), axis=0) <= np.maximum(RIGID * s.noise, 1e-3 * s.apart)
+    if not s.still or not keeps[np.ix_(moving, s.still)].any(axis=1).all():
+        return
+    found, left = list[Group](), list(moving)
+    while left:
+        own = [k for k in left if keeps[left[0], k]]
+        left = [k for k in left if k not in own]
+        pivots = [k for k in s.still if keeps[own, k].all()]
+        found.append((*sorted(pivots, key=lambda k: float(s.apart[own, k].max()))[:1], *own))
+    if len(found) > 1:
+        raise _several(s, found, "pendulums that swing apart from each other", "")
+
+
+def _several(s: Seen, objects: Sequence[Group], what: str, more: str) -> RecordingError:
+    names = s.recording.markers
+    fix = "draft one at a time, with --markers " + " or --markers ".join(f"'{_pattern(names, own)}'" for own in objects)
+    got = "; and ".join(joined(names[k] for k in own) for own in objects)
+    return RecordingError("markers", f"are those of {COUNTS.get(len(objects), len(objects))} {what}", got, fix + more)
 
 
 def _groups(s: Seen) -> list[Group]:
@@ -107,9 +142,10 @@ def _kind(s: Seen, group: Group) -> str:
 
 
 def _is_sheet(s: Seen, group: Group) -> bool:
-    in_bodies = {k for body in s.bodies for k in body}
-    own = {i for i, k in enumerate(group) if k in in_bodies}
-    return is_sheet(s.recording.positions[:, list(group)], s.apart[np.ix_(group, group)], own)
+    place = {k: i for i, k in enumerate(group)}
+    bodies = [own for body in s.bodies if (own := [place[k] for k in body if k in place])]
+    still = [place[k] for k in s.still if k in place]
+    return is_sheet(s.recording.positions[:, list(group)], s.apart[np.ix_(group, group)], bodies, still)
 
 
 def _on_its_own(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from statistics import NormalDist
 from typing import Literal
 
@@ -14,7 +16,7 @@ from ..arrays.timeseries import default_max_gap, interpolate, mean_position
 from ..errors import RecordingError
 from ..recording.recording import Recording
 from . import strangers
-from .line import chain
+from .line import chain, turns_sharply
 
 Array = np.ndarray
 EARTH = 9.81
@@ -111,7 +113,7 @@ def seen(recording: Recording, up: str | None = None) -> Seen:
     moved = np.sqrt(np.nanmean(np.sum((x - center) ** 2, axis=2), axis=0)) if len(t) > 1 else np.zeros(count)
     _check_together(recording)
     _check_rate(recording)
-    distance = _distances(x)
+    distance = distances(x)
     # by each one's own noise: marks of the room make the extent large, and may be noisier
     stays = moved <= (STILL * np.fmax(each, noise) if noise else SILENT * extent)
     if (found := strangers.of_the_room(recording, stays, distance, each)) is not None:
@@ -136,7 +138,7 @@ def seen(recording: Recording, up: str | None = None) -> Seen:
         speed=_speed(recording),
         up=axis,
         up_by="user" if up is not None else "file" if told else "guess",
-        sheet=is_sheet(x, apart, in_bodies),
+        sheet=is_sheet(x, apart, bodies, np.flatnonzero(still).tolist()),
     )
 
 
@@ -180,7 +182,7 @@ def _above(frames: int) -> float:
     return float(np.sqrt(2.0)) * NormalDist().inv_cdf((rank - 0.375) / (frames + 0.25))
 
 
-def _distances(x: Array) -> Array:
+def distances(x: Array) -> Array:
     """(frames, markers, markers) m, of so many frames that the array stays small."""
     most = max(60, 4_000_000 // x.shape[1] ** 2)
     some = x[np.linspace(0, len(x) - 1, min(len(x), most)).astype(int)]
@@ -207,7 +209,7 @@ def _bodies(keeps: Array, apart: Array, still: Array) -> list[tuple[int, ...]]:
 
 def rigid(x: Array, noise: float) -> bool:
     """Whether markers (frames, markers, 3) keep their distances, up to the noise, m."""
-    distance = _distances(x)
+    distance = distances(x)
     return bool(np.all(np.nanstd(distance, axis=0) <= np.maximum(RIGID * noise, 1e-3 * np.nanmax(distance, axis=0))))
 
 
@@ -265,12 +267,30 @@ def _up(recording: Recording) -> tuple[int, bool]:
     return (1 if spread[1] > 1.5 * spread[2] else 2), False
 
 
-def is_sheet(x: Array, apart: Array, in_bodies: set[int]) -> bool:
+def fixtures(apart: Array, still: Sequence[int]) -> list[tuple[int, ...]]:
+    """Groups of three or more markers that stay and lie on no line, as those on a vise or on a robot that rests."""
+    left, neighbors = set(still), tree(apart, tuple(range(len(apart))))[0]
+    found = []
+    while left:
+        group, reached = set[int](), {min(left)}
+        while reached:
+            group |= reached
+            reached = {k for j in reached for k in neighbors[j] if k in left} - group
+        left -= group
+        own = tuple(sorted(group))
+        if len(own) >= 3 and turns_sharply(apart, chain(apart, own)):
+            found.append(own)
+    return found
+
+
+def is_sheet(x: Array, apart: Array, bodies: Sequence[Sequence[int]], still: Sequence[int] = ()) -> bool:
     """Whether the markers have neighbors on all sides, or the shortest way through them turns back again and again.
-    Those of a hand's body do not count."""
-    if 2 * len(in_bodies) <= len(apart):
-        own = [k for k in range(len(apart)) if k not in in_bodies]
-        x, apart = x[:, own], apart[np.ix_(own, own)]
+    Those on what holds them do not count: bodies with half of the markers at most, or at the ends of a line."""
+    few = {k for group in bodies for k in group}
+    few = few if 2 * len(few) <= len(apart) else set()
+    holding = _at_the_ends(apart, [*bodies, *fixtures(apart, still)]) or few
+    own = [k for k in range(len(apart)) if k not in holding]
+    x, apart = x[:, own], apart[np.ix_(own, own)]
     if len(apart) < FEWEST_OF_SHEET:
         return False
     d = apart + np.where(np.eye(len(apart), dtype=bool), np.inf, 0.0)
@@ -284,3 +304,16 @@ def is_sheet(x: Array, apart: Array, in_bodies: set[int]) -> bool:
     way = np.diff(x[fullest, list(chain(apart, everyone))], axis=0)
     back = np.sum(way[1:] * way[:-1], axis=1) < 0.0
     return bool(back.sum() >= TURNS and back.mean() > SHARP)
+
+
+def _at_the_ends(apart: Array, groups: Sequence[Sequence[int]]) -> set[int]:
+    """The markers of one or two of the groups, where the others are a line of three or more and each of these groups is
+    at an end of it of its own; else none."""
+    for chosen in [*combinations(groups, 2), *combinations(groups, 1)]:
+        holding = {k for group in chosen for k in group}
+        line = chain(apart, tuple(k for k in range(len(apart)) if k not in holding))
+        if len(line) >= 3 and not turns_sharply(apart, line):
+            near = {line[int(apart[np.ix_(group, line)].min(axis=0).argmin())] for group in chosen}
+            if len(near) == len(chosen) and near <= {line[0], line[-1]}:
+                return holding
+    return set()
