@@ -1,24 +1,28 @@
 """What the profiles of a fit cost, and how near their ends are to those of refits.
 
     python experiments/bench/profiles.py experiments/wires/wires.toml experiments/twin_cloth/twin_cloth.toml
-    python experiments/bench/profiles.py --count experiments/held_cloth/held_cloth.toml   # without refits
+    python experiments/bench/profiles.py --every --refits 2 experiments/held_cloth/held_cloth.toml
 
 Each configuration is fitted as `sheetbend fit` does. Every profile that its intervals ask for is counted; its ends are
-then looked for once more by refits of all other parameters, from the linear picture on.
+then looked for once more by refits of all other parameters, from the linear picture on. With --every, profiles are made
+where a configuration or the recipe for gripped ropes asks for linear intervals too.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 import tempfile
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 from sheetbend.cli.app import app
 from sheetbend.doubts.profiles import Profiles
+from sheetbend.fitting import fit as fitting
+from sheetbend.fitting.conclusion import Asked
 from sheetbend.minimum.coordinates import step_limits
 from sheetbend.minimum.counts import counted
 from sheetbend.minimum.profile_path import ProfilePath
@@ -31,12 +35,12 @@ class Study:
     """What the profiles of one configuration took.
 
     Attributes:
-        refits: whether ends are compared with those of refits.
+        refits: of how many parameters the ends are compared with those of refits.
         off: of each end that both ways found, the distance over the width of the linear interval.
         open: ends that only one of both ways found.
     """
 
-    refits: bool
+    refits: int
     evaluations: int = 0
     jacobians: int = 0
     seconds: float = 0.0
@@ -53,12 +57,12 @@ class Study:
         self.seconds += time.process_time() - began
         self.evaluations += after[0] - before[0]
         self.jacobians += after[1] - before[1]
+        compared = max(self.refits - len(self.names), 0)
         self.names += [one.name for one in wanted]
-        if self.refits:
-            began = time.process_time()
-            for one, profile in zip(wanted, found, strict=True):
-                self._compare(profiles, one, profile)
-            self.refit_seconds += time.process_time() - began
+        began = time.process_time()
+        for one, profile in list(zip(wanted, found, strict=True))[:compared]:
+            self._compare(profiles, one, profile)
+        self.refit_seconds += time.process_time() - began
         return found
 
     def _compare(self, profiles: Profiles, wanted: Wanted, profile: Profile) -> None:
@@ -97,15 +101,18 @@ def row(file: Path, study: Study) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("configurations", nargs="+", type=Path)
-    parser.add_argument("--count", action="store_true", help="without refits")
+    parser.add_argument("--every", action="store_true", help="profiles where linear intervals are asked for too")
+    parser.add_argument("--refits", type=int, default=sys.maxsize, help="of that many parameters; 0 counts alone")
     given = parser.parse_args()
+    if given.every:
+        fitting.Asked = lambda *asked: replace(Asked(*asked), profiles=True)  # type: ignore[misc,assignment]
     print(
         "| experiment | parameters | Jacobians per parameter | evaluations | farthest from refits, of the width "
         "| ends beyond 1 % of it | found by one way alone | seconds of all profiles (of refits) |"
     )
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     for file in given.configurations:
-        study = Study(not given.count)
+        study = Study(given.refits)
         Profiles.each = lambda profiles, wanted, study=study: study.each(profiles, wanted)  # type: ignore[method-assign]
         with tempfile.TemporaryDirectory() as folder:
             told = CliRunner().invoke(app, ["fit", str(file), "--output", folder])

@@ -198,6 +198,27 @@ def test_one_command_fits_all_and_does_nothing_twice(ropes: Path) -> None:
     assert len(collected["fits"]) == 4 and collected["without"] == {} and list(collected["older"]) == ["c"]
 
 
+def test_a_specimen_that_lacks_a_marker_is_named(ropes: Path, tmp_path: Path) -> None:
+    for name in "abcd":
+        (tmp_path / f"{name}.toml").write_text((ropes / f"{name}.toml").read_text(), encoding="utf-8")
+        r = sb.Recording.load(ropes / f"{name}.npz")
+        x, markers = r.positions.copy(), r.markers
+        if name == "b":  # the last marker fell off before the recording, so the others move along the rope
+            x, markers = x[:, :-1], markers[:-1]
+        if name == "c":
+            x[4:, 3] = np.nan
+        sb.Recording(x, r.times, markers, name=name).save(tmp_path / f"{name}.npz")
+    run("fit", tmp_path / "*.toml", "--output", tmp_path / "out")
+    whole, short = ((tmp_path / "out" / name / "report.txt").read_text() for name in "ac")
+    assert "markers: all of them, at equal distances from end to end" in whole and "seen in few" not in whole
+    assert "c: markers seen in few of the fitted frames: m3 (20 %)" in short
+    told = last_line(run("collect", tmp_path / "out", "--output", tmp_path / "all", "--json"))
+    assert told["markers"] == {"b": "lacks m6", "c": "m3 is seen in 20 % of the frames"}
+    rows = csv.DictReader((tmp_path / "all" / "fits.csv").read_text().splitlines())
+    assert {row["specimen"]: row["markers"] for row in rows} == {"a": "", "d": "", **told["markers"]}
+    assert "markers: b: lacks m6; c: m3 is seen" in (tmp_path / "all" / "population.txt").read_text()
+
+
 def test_several_fits_refuse_what_is_for_one(ropes: Path) -> None:
     assert last_line(run("fit", ropes / "*.toml", "--movie", "x.gif", "--json"))["error"]["field"] == "--movie"
     assert last_line(run("fit", ropes / "none*.toml", "--json"))["error"]["field"] == "config"

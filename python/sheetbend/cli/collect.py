@@ -75,7 +75,14 @@ def _collect(console: Console, results: list[Path], output: Path) -> Outcome:
         except MissingExtraError as error:
             console.print(f"no forest plot: {error}", soft_wrap=True)
     console.print(f"\nwritten to {folder}: {', '.join(names)}", soft_wrap=True)
-    told = {"fits": list(fits), "without": without, "older": older, "output": str(folder), "files": names}
+    told = {
+        "fits": list(fits),
+        "without": without,
+        "older": older,
+        "markers": found.markers,
+        "output": str(folder),
+        "files": names,
+    }
     return Outcome({"population": found.to_dict(), **told})
 
 

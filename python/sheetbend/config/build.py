@@ -54,8 +54,8 @@ class Study:
 
     @property
     def assumptions(self) -> tuple[str, ...]:
-        """What holds the ends of ropes, and what that assumes, in words."""
-        return assumptions(self.config.scene)
+        """What holds the ends of ropes, where markers without a place are, and what that assumes, in words."""
+        return assumptions(self.config)
 
     @property
     def wanted(self) -> Parameters:

@@ -1,20 +1,23 @@
-"""What a configuration assumes about how its ropes are held, in words."""
+"""What a configuration assumes about how its ropes are held and where their markers are, in words."""
 
 from __future__ import annotations
 
 from .rope_schema import Rod, Rope, RopeGrip
 from .scene_schema import SceneSection
+from .schema import Config
 
 _FEW = 4  # markers that are named; of more their number is
 
 
-def assumptions(section: SceneSection) -> tuple[str, ...]:
-    """A sentence for each end of each rope and rod, ropes first."""
-    return tuple(
-        f"{strand.name}, {end}: {_of_end(section, strand, end)}"
-        for _, strand in section.strands
-        for end in ("start", "end")
-    )
+def assumptions(config: Config) -> tuple[str, ...]:
+    """A sentence for each end of each rope and rod, ropes first; and one if nothing places the markers of the only
+    rope."""
+    strands = [strand for _, strand in config.scene.strands]
+    ends = tuple(f"{s.name}, {end}: {_of_end(config.scene, s, end)}" for s in strands for end in ("start", "end"))
+    unplaced = not config.marker and any(r.cloud is None and not (r.marker or r.here) for r in config.recording)
+    if len(strands) != 1 or config.scene.cloth or strands[0].markers or not unplaced:
+        return ends
+    return (*ends, f"{strands[0].name}, markers: all of them, at equal distances from end to end: nothing places them")
 
 
 def _of_end(section: SceneSection, strand: Rope | Rod, end: str) -> str:

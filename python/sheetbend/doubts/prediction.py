@@ -94,7 +94,15 @@ class Comparison:
             measured_frequency=measured,
             simulated_frequency=simulated,
             unit="m" if radius is None else "rad",
+            seen=self._seen() if rows else {},
         )
+
+    def _seen(self) -> dict[str, float]:
+        """By marker, in what share of the fitted frames it was seen; none of a cloud."""
+        if self.experiment.is_cloud:
+            return {}
+        shares = self.recording.mask[~self.held_out].mean(axis=0)
+        return dict(zip(self.recording.markers, map(float, shares), strict=True))
 
 
 def predicted_values(

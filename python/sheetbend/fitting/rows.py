@@ -43,6 +43,7 @@ def recording_fit(
         other,
         rows=found.rows,
         rms=found.rms,
+        seen=found.seen,
         driven_sigma=found.driven_sigma,
         corrected_by=found.corrected_by,
         start_moved=found.start_moved,

@@ -126,7 +126,7 @@ def check_seen(positions: Array, markers: tuple[str, ...]) -> None:
     never = np.isnan(positions[:, :, 0]).all(axis=0)
     if never.any():
         names = [markers[i] for i in np.flatnonzero(never)]
-        fix = "leave them out"
+        fix = "remove them, and give the others their places if nothing else does"
         raise RecordingError("positions", "hold markers that are never seen (all NaN)", names, fix)
 
 

@@ -16,6 +16,7 @@ from ..quantities.wording import short
 from ..result.estimate import Estimate
 from ..result.result import FitData
 from ..statistics.population import Population, population
+from .report_recordings import SELDOM
 from .tables import Section, plain_section
 
 COUNTED = ("identified", "weak")  # verdicts of estimates that a population is made from
@@ -80,6 +81,21 @@ class Collected:
         names = dict.fromkeys(e.name for fit in fits.values() for e in fit.estimates if "[" not in e.name)
         return Collected(dict(fits), tuple(_trait(name, fits) for name in names))
 
+    @property
+    def markers(self) -> dict[str, str]:
+        """By specimen, which markers it lacks or seldom shows though most specimens show them, in words."""
+        best = {name: seen for name, fit in self.fits.items() if (seen := _seen_best(fit))}
+        every = dict.fromkeys(marker for seen in best.values() for marker in seen)
+        shown = {m: sum(seen.get(m, 0.0) >= SELDOM for seen in best.values()) for m in every}
+        common = [m for m in every if shown[m] > len(best) / 2]
+        words = {}
+        for name, seen in best.items():
+            lacks = [m for m in common if m not in seen]
+            few = [f"{m} is seen in {100 * seen[m]:.2g} % of the frames" for m in common if seen.get(m, 1.0) < SELDOM]
+            if lacks or few:
+                words[name] = "; ".join([f"lacks {', '.join(lacks)}"] * bool(lacks) + few)
+        return words
+
     def report(self) -> str:
         """The table and the population as plain text."""
         headers = ("parameter", "specimens", "mean", "95 % interval", "unit", "spread", "95 % of it")
@@ -93,6 +109,9 @@ class Collected:
             if trait.left_out:
                 told = ", ".join(f"{name} ({verdict})" for name, verdict in trait.left_out.items())
                 notes.append((f"{trait.name} leaves out", told))
+        if self.markers:
+            told = "; ".join(f"{name}: {words}" for name, words in self.markers.items())
+            notes.append(("markers", f"{told}. Most specimens show these markers in most frames"))
         rows = tuple(trait.told() for trait in self.traits)
         return "\n".join(plain_section(Section("Population", headers, rows, tuple(notes)))) + "\n"
 
@@ -100,11 +119,25 @@ class Collected:
         """CSV with a row for each specimen and parameter."""
         out = io.StringIO()
         to = csv.writer(out, lineterminator="\n")
-        to.writerow(("specimen", "parameter", "value", "lower", "upper", "half_width", "unit", "verdict", "converged"))
+        to.writerow(
+            (
+                "specimen",
+                "parameter",
+                "value",
+                "lower",
+                "upper",
+                "half_width",
+                "unit",
+                "verdict",
+                "converged",
+                "markers",
+            )
+        )
+        markers = self.markers
         for name, fit in self.fits.items():
             for e in fit.estimates:
                 numbers = ("" if x is None else repr(x) for x in (e.value, e.lower, e.upper, e.half_width))
-                to.writerow((name, e.name, *numbers, e.unit, e.verdict, fit.converged))
+                to.writerow((name, e.name, *numbers, e.unit, e.verdict, fit.converged, markers.get(name, "")))
         return out.getvalue()
 
     def petab(self) -> str:
@@ -125,6 +158,15 @@ class Collected:
     def to_dict(self) -> dict[str, Any]:
         """Strict JSON values of the population."""
         return {trait.name: asdict(trait) for trait in self.traits}
+
+
+def _seen_best(fit: FitData) -> dict[str, float]:
+    """By marker, the share of the fitted frames of the recording that shows it most."""
+    best: dict[str, float] = {}
+    for recording in fit.recordings:
+        for marker, share in recording.seen.items():
+            best[marker] = max(share, best.get(marker, 0.0))
+    return best
 
 
 def _trait(name: str, fits: Mapping[str, FitData]) -> Trait:

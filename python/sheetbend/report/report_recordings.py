@@ -7,6 +7,9 @@ from ..result.motions import ForceFit, RecordingFit
 from ..result.result import FitData
 from .tables import Section
 
+SELDOM = 0.5  # of the fitted frames: a marker that is seen in fewer is named
+SHOWN = 5  # markers that are named
+
 
 def recordings(result: FitData) -> Section:
     rows = [_recording_row(recording) for recording in result.recordings]
@@ -26,6 +29,7 @@ def recordings(result: FitData) -> Section:
         for label, words in (
             ("held out", result.held_out_is),
             ("baseline (no physics)", result.baseline),
+            *((recording.name, _seldom_seen(recording)) for recording in result.recordings),
             *((recording.name, _started(recording)) for recording in result.recordings),
             *((recording.name, _corrected(recording)) for recording in result.recordings),
         )
@@ -46,6 +50,13 @@ def forces(result: FitData) -> Section:
         headers, every = headers[:4] + headers[5:], [row[:4] + row[5:] for row in every]
     note = ("constant", "rms of the prediction that the force stays at its mean over the fitted part")
     return Section("Forces", headers, tuple(every), (note,) if every else ())
+
+
+def _seldom_seen(recording: RecordingFit) -> str:
+    few = sorted((share, name) for name, share in recording.seen.items() if share < SELDOM)
+    told = ", ".join(f"{name} ({100 * share:.2g} %)" for share, name in few[:SHOWN])
+    more = f" and {len(few) - SHOWN} more" if len(few) > SHOWN else ""
+    return f"markers seen in few of the fitted frames: {told}{more}" if few else ""
 
 
 def _corrected(recording: RecordingFit) -> str:

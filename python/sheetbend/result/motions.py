@@ -27,6 +27,8 @@ class RecordingFit:
             start differ from the given ones; None of another start.
         measured_frequency, simulated_frequency: first frequency there, Hz; None where the part shows fewer than three
             periods.
+        seen: by compared marker, the share of the frames of the fitted part in which it was seen; empty for a cloud,
+            and where all was held out.
     """
 
     name: str
@@ -44,6 +46,7 @@ class RecordingFit:
     without_physics: Mapping[str, float] = field(default_factory=dict)
     late: float | None = None
     late_half_width: float | None = None
+    seen: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
