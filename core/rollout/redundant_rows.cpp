@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <sstream>
 
 #include "core/rollout/rollout.h"
@@ -142,6 +143,23 @@ std::vector<RedundantRow> redundant_rows(const Scene& scene, const Plan& plan, c
     }
   }
   return found;
+}
+
+std::vector<int> constraints_among(const Scene& scene, const std::vector<RedundantRow>& rows) {
+  std::set<int> found;
+  const auto add = [&](int row) {
+    if (row >= scene.rows) {
+      found.insert(scene.constraints + row - scene.rows);
+    } else {
+      const Group& group = group_of(scene, row);
+      found.insert(group.first + (row - group.first_row) / group.rows);
+    }
+  };
+  for (const RedundantRow& r : rows) {
+    add(r.row);
+    for (const int other : r.others) add(other);
+  }
+  return {found.begin(), found.end()};
 }
 
 const Group& group_of(const Scene& scene, int row) {

@@ -24,6 +24,10 @@ std::vector<RedundantRow> redundant_rows(const Scene& scene, const Plan& plan, c
 // Those of a rollout's first substep from the initial state.
 std::vector<RedundantRow> redundant_rows(const Scene& scene, const Plan& plan, const double* inputs, double t0);
 
+// The constraints of these rows and of those that they follow from, ascending; volumes count on behind the constraints. One of them that gets a compliance
+// makes room for another, so that the motion jumps from one derivative with respect to it to another.
+std::vector<int> constraints_among(const Scene& scene, const std::vector<RedundantRow>& rows);
+
 // The group that a row of the constraints' multipliers belongs to.
 const Group& group_of(const Scene& scene, int row);
 

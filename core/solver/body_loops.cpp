@@ -2,8 +2,15 @@
 
 #include <map>
 #include <numeric>
+#include <tuple>
 
 namespace sheetbend {
+namespace {
+
+// Rows between points of the same two bodies, of one group: so many keep a point on a line, and a point in a place.
+constexpr int rows_of_line = 2, rows_of_point = 3;
+
+}  // namespace
 
 bool closes_loop(const Scene& scene, const std::vector<Member>& members) {
   std::map<int, int> body_of;  // by its center
@@ -15,16 +22,23 @@ bool closes_loop(const Scene& scene, const std::vector<Member>& members) {
     while (joined[b] != b) b = joined[b];
     return b;
   };
+  std::map<std::tuple<int, int, int>, int> rows_between;  // of a group, two bodies
   for (const Member& m : members) {
     const Group& group = scene.groups[m.group];
-    if (group.rows != 3 || group.arity != 8) continue;  // `coincide` of two bodies, whose centers come first
+    if (group.points != 2) continue;
     const auto end = [&](int k) {
       const int node = group.nodes(m.item)[k];
       const auto found = body_of.find(node);
       return scene.role[node] != Role::free ? ground : found == body_of.end() ? -1 : found->second;
     };
-    if (end(0) < 0 || end(1) < 0 || (end(0) == ground && end(1) == ground)) continue;  // such as a pinned mean
-    const int a = root(end(0)), b = root(end(1));
+    const auto [first, second] = std::minmax({end(0), end(1)});
+    if (first < 0 || first == ground) continue;  // a particle, such as a pinned mean; or nothing moves
+    int& rows = rows_between[{m.group, first, second}];
+    const bool were_joined = rows >= rows_of_line;
+    rows += group.rows;
+    if (rows > rows_of_point) return true;  // more than one joint
+    if (were_joined || rows < rows_of_line) continue;
+    const int a = root(first), b = root(second);
     if (a == b) return true;
     joined[a] = b;
   }

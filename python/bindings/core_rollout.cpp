@@ -136,6 +136,13 @@ std::string redundant(const Solver& s, const Array& inputs, double t0) {
   return describe(*s.scene, redundant_rows(*s.scene, s.plan, inputs.data(), t0), x);
 }
 
+// The constraints that these rows take part in, as constraints_among() has them.
+std::vector<int> redundant_constraints(const Solver& s, const Array& inputs, double t0) {
+  expect_size(inputs, s.scene->layout.total(), "inputs");
+  Release release;
+  return constraints_among(*s.scene, redundant_rows(*s.scene, s.plan, inputs.data(), t0));
+}
+
 py::array_t<double> states(const Solver& s, const Array& inputs, const Steps& steps, double t0) {
   check(s, inputs, 1, steps);
   auto out = empty({steps.size(), static_cast<std::size_t>(s.scene->dofs())});
@@ -233,6 +240,7 @@ void bind_rollout(py::module_& m) {
       .def("force_balance", &force_balance, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
       .def("settled", &settled, py::arg("inputs"), py::arg("t0"))
       .def("redundant", &redundant, py::arg("inputs"), py::arg("t0"))
+      .def("redundant_constraints", &redundant_constraints, py::arg("inputs"), py::arg("t0"))
       .def("simulate_batch", &simulate_batch, py::arg("inputs"), py::arg("steps"), py::arg("t0"),
            py::arg("lengths") = Lengths())
       .def_property_readonly("blocks",

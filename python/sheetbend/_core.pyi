@@ -159,6 +159,8 @@ class Solver:
     def force_balance(self, inputs: ArrayLike, steps: int, t0: float) -> list[list[list[float]]]: ...
     def settled(self, inputs: ArrayLike, t0: float) -> Array: ...  # (dofs,) where a start that settles begins
     def redundant(self, inputs: ArrayLike, t0: float) -> str: ...  # rows that others say already, in words
+    # the constraints of those and of the others; volumes count on behind the constraints
+    def redundant_constraints(self, inputs: ArrayLike, t0: float) -> list[int]: ...
     # lengths: (batch,) frames of each scene, or none where all have every frame
     def simulate_batch(
         self, inputs: ArrayLike, steps: Sequence[int], t0: float, lengths: Sequence[int] = ()

@@ -1,10 +1,9 @@
-// Joints between bodies: oracles of pendulums and springs, mechanisms with rows too many, and the gradients of all their numbers.
+// Joints between bodies: oracles of pendulums and springs, and the gradients of all their numbers.
 #include <gtest/gtest.h>
 
 #include "adjoint/rollout/rollout.h"
-#include "core/rollout/redundant_rows.h"
 #include "core/scalar/complex.h"
-#include "tests/cpp/support/bodies.h"
+#include "tests/cpp/support/joints.h"
 #include "tests/cpp/support/programs.h"
 
 namespace sheetbend::testing {
@@ -26,35 +25,6 @@ std::vector<double> trajectory(const Scene& scene, const std::vector<double>& in
 struct Link {
   double mass, inertia, below;
 };
-
-// Turned by theta from straight down.
-std::array<Vec3<double>, 3> hanging(double theta) {
-  const double c = std::cos(theta), s = std::sin(theta);
-  return {{{s, 0, -c}, {0, 1, 0}, {c, 0, s}}};
-}
-
-// The hinge about the second axis of both bodies.
-void hinge(BodyScene& s, const Body& a, const Vec3<double>& X, const Body& b, const Vec3<double>& Y) {
-  const auto both = [&](bool centers) {
-    std::vector<int> nodes;
-    if (centers) nodes = {a.center, b.center};
-    nodes.insert(nodes.end(), a.axes.begin(), a.axes.end());
-    nodes.insert(nodes.end(), b.axes.begin(), b.axes.end());
-    return nodes;
-  };
-  s.add("coincide", both(true), {X.x, X.y, X.z, Y.x, Y.y, Y.z});
-  s.add("across", both(false), {0, 1, 0, 1, 0, 0});
-  s.add("across", both(false), {0, 1, 0, 0, 0, 1});
-}
-
-// A body that stands still at the origin: all its nodes are pinned.
-Body ground(BodyScene& s, const std::array<Vec3<double>, 3>& R = hanging(0.0)) {
-  Body b{s.add_node({}, 1.0), {}};
-  for (int k = 0; k < 3; ++k) b.axes[k] = s.add_node(R[k], 1.0);
-  s.spec.pinned.insert(s.spec.pinned.end(), {b.center, b.axes[0], b.axes[1], b.axes[2]});
-  s.spec.bodies.push_back(b);
-  return b;
-}
 
 // Links hinged one below the other from the ground, `length` apart.
 std::vector<Body> chain(BodyScene& s, const std::vector<Link>& links, double length,
@@ -196,19 +166,12 @@ TEST(Joints, GradientMatchesComplexStep) {
   const auto links = chain(s, {{0.3, 1e-3, 0.1}, {0.2, 8e-4, 0.1}}, 0.2, {0.4, 0.9});
   const Body slide = s.add_body({0.5, 0.1, -0.1}, 0.2, {1e-3, 2e-3, 1.5e-3}, hanging(0.2), {0, 3, 0});
   const int bead = s.add_node({0.6, 0.1, -0.3}, 0.05);
-  const auto pair = [](const Body& a, const Body& b, bool centers) {
-    std::vector<int> nodes;
-    if (centers) nodes = {a.center, b.center};
-    nodes.insert(nodes.end(), a.axes.begin(), a.axes.end());
-    nodes.insert(nodes.end(), b.axes.begin(), b.axes.end());
-    return nodes;
-  };
   const int dial = s.add_node({0.1, 0, 0}, 1.0);
-  auto turn = pair(links[0], links[1], false);
+  auto turn = nodes_of(links[0], links[1], false);
   turn.push_back(dial);
   s.add("joint_angle", turn, {1, 0, 0, 0, 0, 1, 1, 0, 0, 0.2}, 5.0, 1e-3);
-  s.add("body_distance", pair(links[1], slide, true), {0.05, 0.02, 0.0, 0.01, 0.0, 0.03, 0.3}, 1e-4);
-  s.add("along", pair(links[1], slide, true), {0.0, 0.02, 0.0, 0.01, 0.0, 0.03, 0.6, 0.0, 0.8, 0.1}, 1e-2);
+  s.add("body_distance", nodes_of(links[1], slide, true), {0.05, 0.02, 0.0, 0.01, 0.0, 0.03, 0.3}, 1e-4);
+  s.add("along", nodes_of(links[1], slide, true), {0.0, 0.02, 0.0, 0.01, 0.0, 0.03, 0.6, 0.0, 0.8, 0.1}, 1e-2);
   s.add("coincide_particle", {slide.center, bead, slide.axes[0], slide.axes[1], slide.axes[2]}, {0.2, 0.01, 0.1}, 1e-4);
   s.add("body_particle_distance", {links[0].center, bead, links[0].axes[0], links[0].axes[1], links[0].axes[2]},
         {0.02, 0.01, 0.1, 0.6}, 1e-3);
@@ -241,13 +204,9 @@ TEST_P(Stops, GradientThroughTheirTouchMatchesComplexStep) {
   const Body still = ground(s), link = s.add_body(0.1 * hanging(0.6)[0], 0.3, {6e-4, 1e-3, 7e-4}, hanging(0.6)),
              weight = s.add_body({0.5, 0.1, -0.1}, 0.2, {1e-3, 2e-3, 1.5e-3}, hanging(0.0));
   hinge(s, still, {}, link, {-0.1, 0, 0});
-  std::vector<int> nodes(still.axes.begin(), still.axes.end());
-  nodes.insert(nodes.end(), link.axes.begin(), link.axes.end());
-  s.add("angle_stop", nodes, {1, 0, 0, 0, 0, 1, 1, 0, 0, 0.35, 0.45, 0.02}, 0.01, 0.13);
-  nodes = {still.center, weight.center};
-  nodes.insert(nodes.end(), still.axes.begin(), still.axes.end());
-  nodes.insert(nodes.end(), weight.axes.begin(), weight.axes.end());
-  s.add("slide_stop", nodes, {0.12, 0.0, 0.5, 0.02, 0.01, 0.01, 1, 0, 0, 0.0, 0.05, 0.005}, 2e-4, 6.0);
+  s.add("angle_stop", nodes_of(still, link, false), {1, 0, 0, 0, 0, 1, 1, 0, 0, 0.35, 0.45, 0.02}, 0.01, 0.13);
+  s.add("slide_stop", nodes_of(still, weight, true), {0.12, 0.0, 0.5, 0.02, 0.01, 0.01, 1, 0, 0, 0.0, 0.05, 0.005},
+        2e-4, 6.0);
   const Scene scene = build_scene(s.spec);
   const auto inputs = s.inputs(scene);
   constexpr int steps = 140;
@@ -263,75 +222,6 @@ TEST_P(Stops, GradientThroughTheirTouchMatchesComplexStep) {
   for (const Quantity q : {Quantity::position, Quantity::velocity, Quantity::mass, Quantity::compliance,
                            Quantity::damping, Quantity::rest, Quantity::gravity})
     expect_quantity_agrees(scene.layout, q, found, oracle, 1e-9);
-}
-
-// A door on two hinges, and a four-bar linkage in the plane of x and z: five and three rows too many.
-BodyScene door() {
-  BodyScene s;
-  const Body frame = ground(s);
-  const Body leaf = s.add_body({0.4, 0, 0}, 2.0, {0.1, 0.12, 0.05}, BodyScene::upright(), {0, 1.0, 0}, {0, 0, -0.4});
-  hinge(s, frame, {0, -0.5, 0}, leaf, {-0.4, -0.5, 0});
-  hinge(s, frame, {0, 0.5, 0}, leaf, {-0.4, 0.5, 0});
-  return s;
-}
-
-BodyScene four_bar() {
-  BodyScene s;
-  const Body frame = ground(s, BodyScene::upright());
-  const auto bar = [&](const Vec3<double>& from, const Vec3<double>& to) {
-    const Vec3<double> e = (1.0 / norm(to - from)) * (to - from);
-    const double l = norm(to - from);
-    return s.add_body(0.5 * (from + to), l, {1e-3 * l, l * l * l / 12, l * l * l / 12},
-                      {e, {0, 1, 0}, cross(e, {0, 1, 0})});
-  };
-  const Vec3<double> A, B(0.02, 0, 0.1), C(0.25, 0, 0.2), D(0.2, 0, 0);
-  const Body crank = bar(A, B), coupler = bar(B, C), rocker = bar(C, D);
-  const auto half = [](const Vec3<double>& a, const Vec3<double>& b) { return Vec3<double>(0.5 * norm(b - a), 0, 0); };
-  hinge(s, frame, A, crank, -half(A, B));
-  hinge(s, crank, half(A, B), coupler, -half(B, C));
-  hinge(s, coupler, half(B, C), rocker, -half(C, D));
-  hinge(s, frame, D, rocker, half(C, D));
-  return s;
-}
-
-struct TooManyRows : ::testing::TestWithParam<int> {
-  BodyScene s = GetParam() == 5 ? door() : four_bar();
-  Scene scene = build_scene(s.spec);
-  std::vector<double> inputs = s.inputs(scene);
-};
-INSTANTIATE_TEST_SUITE_P(, TooManyRows, ::testing::Values(5, 3),
-                         [](const auto& info) { return info.param == 5 ? "Door" : "FourBar"; });
-
-TEST_P(TooManyRows, AreNamed) {
-  const Plan plan = make_plan(scene, {.h = 1.0 / 480, .partition = Partition::direct});
-  const auto rows = redundant_rows(scene, plan, inputs.data(), 0.0);
-  EXPECT_EQ(static_cast<int>(rows.size()), GetParam()) << describe(scene, rows, inputs.data());
-  for (const auto& r : rows) EXPECT_LE(r.contradiction, 1e-12);
-}
-
-TEST_P(TooManyRows, MoveAndDifferentiateAsWithoutThem) {
-  const Program program{scene, make_plan(scene, {.h = 1.0 / 480, .partition = Partition::direct}), 48};
-  const auto all = states(program, inputs);
-  const double* x = &all[48 * scene.dofs()];
-  double moved = 0.0;
-  for (int i = 0; i < scene.dofs(); ++i) moved = std::max(moved, std::abs(x[i] - all[i]));
-  EXPECT_GT(moved, 0.03);
-  AnyConstraint<double> at;
-  for (const Group& group : scene.groups)
-    for (int i = 0; i < group.count; ++i) {
-      for (int k = 0; k < group.arity; ++k) std::copy_n(x + scene.first_dof[group.nodes(i)[k]], 3, at.x + 3 * k);
-      at.evaluate(group.kind, &inputs[scene.layout.of(Quantity::rest)] + group.first_value + i * group.parameters);
-      for (int j = 0; j < group.rows; ++j) EXPECT_NEAR(at.C[j], 0.0, 1e-12) << group.name << i;
-    }
-  const auto oracle = complex_step_gradient([&](const std::vector<Complex>& z) { return loss(program, z); }, inputs);
-  const auto found = gradient(program, inputs);
-  for (const Quantity q : {Quantity::velocity, Quantity::mass, Quantity::rest, Quantity::position}) {
-    const std::size_t first = scene.layout.of(q), count = scene.layout.count(q);
-    const double error =
-        relative_error(std::span(found).subspan(first, count), std::span(oracle).subspan(first, count));
-    EXPECT_LE(error, 1e-8) << quantity_names[static_cast<int>(q)];
-    record_error(quantity_names[static_cast<int>(q)], error);
-  }
 }
 
 }  // namespace

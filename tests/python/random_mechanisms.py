@@ -140,30 +140,35 @@ def scene_of(seed: int) -> tuple[sb.Scene, sb.Solver, str]:
 
 
 def differs(seed: int, given: sb.Solver | None = None) -> tuple[dict[str, float], str]:
-    """By input array, how far the adjoint is from the complex step along a direction of all of its entries, relative to
-    the largest that the two may be; and what the scene is made of."""
+    """`gaps` of a seed's scene, and what it is made of."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         scene, solver, parts = scene_of(seed)
-        compiled, solver = scene.compiled, given or solver
-        core, inputs, steps = solver.core(compiled), compiled.inputs(), [1, SUBSTEPS]
-        rng = np.random.default_rng(seed)
-        with divergence(scene):
-            x, tape = core.record(inputs, steps, 0.0)
-            weights = rng.standard_normal(x.shape)
-            adjoint = core.vjp(inputs, tape, steps, weights, 0.0)
-        found = {}
-        for name, (first, size) in compiled.layout.items():
-            own = slice(first, first + size)
-            if size == 0:
-                continue
-            direction = np.zeros(len(inputs))
-            direction[own] = rng.standard_normal(size) * np.where(inputs[own] == 0.0, 1.0, inputs[own])
-            exact = float((core.complex_step(inputs, direction, steps, 0.0) * weights).sum())
-            shares = adjoint * direction
-            largest = np.abs(shares).max()
-            found[name] = abs(exact - float(shares.sum())) / max(largest, abs(exact), 1e-12 * np.abs(weights * x).sum())
-    return found, parts
+        return gaps(scene, given or solver, seed), parts
+
+
+def gaps(scene: sb.Scene, solver: sb.Solver, seed: int = 0) -> dict[str, float]:
+    """By input array, how far the adjoint is from the complex step along a direction of all of its entries, relative to
+    the largest that the two may be. What moves the positions by less than their rounding is no gap."""
+    compiled = scene.compiled
+    core, inputs, steps = solver.core(compiled), compiled.inputs(), [1, SUBSTEPS]
+    rng = np.random.default_rng(seed)
+    with divergence(scene):
+        x, tape = core.record(inputs, steps, 0.0)
+        weights = rng.standard_normal(x.shape)
+        adjoint = core.vjp(inputs, tape, steps, weights, 0.0)
+    rounding = np.finfo(float).eps * np.abs(weights * x).sum()
+    found = {}
+    for name, (first, size) in compiled.layout.items():
+        own = slice(first, first + size)
+        if size == 0:
+            continue
+        direction = np.zeros(len(inputs))
+        direction[own] = rng.standard_normal(size) * np.where(inputs[own] == 0.0, 1.0, inputs[own])
+        exact = float((core.complex_step(inputs, direction, steps, 0.0) * weights).sum())
+        shares = adjoint * direction
+        found[name] = abs(exact - float(shares.sum())) / max(np.abs(shares).max(), abs(exact), rounding / BOUND)
+    return found
 
 
 def main(seconds: float, first: int) -> None:

@@ -66,7 +66,8 @@ def mistaken(monkeypatch: pytest.MonkeyPatch, name: str, factor: float) -> None:
             bar[offset : offset + size] *= factor
             return bar
 
-        others = {n: getattr(inner, n) for n in ("simulate", "record", "complex_step", "jvp")}
+        kept = ("simulate", "record", "complex_step", "jvp", "redundant_constraints")
+        others = {n: getattr(inner, n) for n in kept}
         return SimpleNamespace(vjp=vjp, **others)
 
     monkeypatch.setattr(sb.Solver, "core", wrong)

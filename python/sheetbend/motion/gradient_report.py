@@ -24,6 +24,8 @@ class GradientRow:
         differences: error against central differences, whose own accuracy limits it.
         passed: complex step within its bound, differences within theirs, or within their noise; or nothing is felt.
         rounding: what complex step and adjoint may differ by for rounding, likewise relative.
+        left_out: entries that were not tested, because they have no derivative: compliances of rigid constraints that
+            follow from one another.
         noise: what differences may be off by for their own error (infinite where none could be taken).
         unfelt: moving any tested entry by its own size changes the loss by less than rounding does, by the adjoint and
             by complex step; relative errors of such a gradient mean nothing.
@@ -38,6 +40,7 @@ class GradientRow:
     unfelt: bool = False
     noise: float = 0.0
     rounding: float = 0.0
+    left_out: int = 0
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,7 @@ class GradientReport:
                 "noise": r.noise if math.isfinite(r.noise) else None,
                 "passed": r.passed,
                 "unfelt": r.unfelt,
+                "left_out": r.left_out,
             }
             for r in self.rows
         }
@@ -96,6 +100,7 @@ class GradientReport:
         lines.append(f"  {'':{width}}  {'entries':>7}  {'largest':>9}  {'complex step':>12}  {'differences':>11}")
         for r in self.rows:
             mark = "  nothing felt beyond rounding" if r.unfelt else _noisy(r) if r.passed else "  <- fails"
+            mark += f"  without {r.left_out} of redundant constraints" if r.left_out else ""
             lines.append(
                 f"  {r.name:{width}}  {r.size:7d}  {r.gradient:9.2e}"
                 f"  {r.complex_step:12.1e}  {r.differences:11.1e}{mark}"

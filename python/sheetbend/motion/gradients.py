@@ -44,7 +44,8 @@ def check_gradients(
     """Check the adjoint of a scene's rollout for every named quantity and every input array.
 
     The loss is a random linear combination of all positions at `times`. Arrays with more than `samples` entries are
-    tested on the largest gradient entries and on random ones.
+    tested on the largest gradient entries and on random ones. Compliances of rigid constraints that follow from one
+    another are not tested: the motion has no derivative with respect to them.
 
     Args:
         scene: is frozen by this.
@@ -79,7 +80,8 @@ def check_gradients(
         weights = rng.standard_normal((len(steps), compiled.core.dofs))
         adjoint = core.vjp(inputs, tape, steps, weights, 0.0)
         probe = Probe(core, inputs, steps, weights, adjoint)
-        checked = _Checked(compiled, probe, adjoint, _jitter(probe, adjoint, solver, np.random.default_rng(seed + 1)))
+        jitter = _jitter(probe, adjoint, solver, np.random.default_rng(seed + 1))
+        checked = _Checked(compiled, probe, adjoint, jitter, _without_derivative(compiled, core, inputs))
         rows = [checked.quantity(theta, name, scene.quantities[name].positive) for name in compiled.names]
         rows += [checked.array(name, samples, rng) for name in _present(compiled)]
         dot = checked.dot_product(rng)
@@ -93,6 +95,16 @@ def _jitter(probe: Probe, adjoint: np.ndarray, solver: Solver, rng: np.random.Ge
         x = jittered(probe.inputs, rng)
         moved.append(core.vjp(x, core.record(x, steps, 0.0, solver.budget)[1], steps, probe.weights, 0.0) - adjoint)
     return np.array(moved)
+
+
+def _without_derivative(compiled: CompiledScene, core: Any, inputs: np.ndarray) -> dict[str, np.ndarray]:
+    """By input array, the entries that the motion has no derivative with respect to: compliances of rigid constraints
+    that follow from one another. One of them that gives way leaves its part to another, which was left out before."""
+    _, count = compiled.layout["compliance"]
+    found = np.array(core.redundant_constraints(inputs, 0.0), dtype=int)
+    of_constraints, of_volumes = found[found < count], found[found >= count] - count
+    entries = {"compliance": of_constraints, "volume_compliance": of_volumes}
+    return {name: own[inputs[compiled.layout[name][0] + own] == 0.0] for name, own in entries.items()}
 
 
 def _within(
@@ -140,12 +152,14 @@ class _Checked:
         probe: the two independent paths.
         adjoint: (inputs,) the gradient that is checked.
         jitter: (JITTERS, inputs) by how much it moves when the last digits of the inputs do.
+        left_out: by input array, the entries without a derivative.
     """
 
     compiled: CompiledScene
     probe: Probe
     adjoint: np.ndarray
     jitter: np.ndarray
+    left_out: Mapping[str, np.ndarray]
 
     def quantity(self, theta: np.ndarray, name: str, positive: bool) -> GradientRow:
         """The row of a named quantity, at the values theta."""
@@ -164,22 +178,25 @@ class _Checked:
         there are no samples."""
         probe = self.probe
         offset, size = self.compiled.layout[name]
-        part, own = self.adjoint[offset : offset + size], probe.inputs[offset : offset + size]
+        left_out = self.left_out.get(name, np.zeros(0, dtype=int))
+        tested = np.delete(np.arange(offset, offset + size), left_out)
+        if len(tested) == 0:
+            return GradientRow(name, size, 0.0, 0.0, 0.0, passed=True, left_out=size)
         if samples == 0:
-            return _row(name, size, [self._all_at_once(part, own, offset, name in SIZED, rng)])
-        largest = np.argsort(-np.abs(part))[: samples // 2]
-        random = rng.choice(size, min(size, samples - len(largest)), replace=False)
+            return _row(name, size, [self._all_at_once(tested, name in SIZED, rng)], len(left_out))
+        part = np.abs(self.adjoint[tested])
+        largest = np.argsort(-part)[: samples // 2]
+        random = rng.choice(len(tested), min(len(tested), samples - len(largest)), replace=False)
         entries = []
-        for i in np.unique(np.concatenate([largest, random])):
+        for i in tested[np.unique(np.concatenate([largest, random]))]:
             direction = np.zeros(len(self.adjoint))
-            direction[offset + i] = 1.0
-            exact = probe.complex_step(direction)
-            size_of = probe.size(float(own[i]), 1e-3, name in SIZED, exact)
+            direction[i] = 1.0
+            exact, gradient = probe.complex_step(direction), float(self.adjoint[i])
+            size_of = probe.size(float(probe.inputs[i]), 1e-3, name in SIZED, exact)
             found = probe.differences(direction, 1e-4 * size_of, exact)
-            of_array = float(np.abs(part).max())
-            moved = self._rounding(direction, self.jitter[:, offset + i], float(part[i]), exact, of_array)
-            entries.append(_Entry(float(part[i]), exact, *found, probe.rounding / size_of, moved))
-        return _row(name, size, entries)
+            moved = self._rounding(direction, self.jitter[:, i], gradient, exact, float(part.max()))
+            entries.append(_Entry(gradient, exact, *found, probe.rounding / size_of, moved))
+        return _row(name, size, entries, len(left_out))
 
     def dot_product(self, rng: np.random.Generator) -> float:
         """<J v, w> by tangents against <v, J^T w> by the adjoint, relative to the size of its terms."""
@@ -189,16 +206,14 @@ class _Checked:
         forward, backward = float((x_dot[0] * probe.weights).sum()), float(v @ self.adjoint)
         return abs(forward - backward) / max(float(np.abs(v * self.adjoint).sum()), 1e-300)
 
-    def _all_at_once(
-        self, part: np.ndarray, own: np.ndarray, offset: int, positive: bool, rng: np.random.Generator
-    ) -> _Entry:
-        """The derivative along one direction in which every entry of an array counts, by its own size and in the sense
-        of its gradient, so that nothing cancels."""
-        probe = self.probe
+    def _all_at_once(self, tested: np.ndarray, positive: bool, rng: np.random.Generator) -> _Entry:
+        """The derivative along one direction in which every entry of these inputs counts, by its own size and in the
+        sense of its gradient, so that nothing cancels."""
+        probe, part, own = self.probe, self.adjoint[tested], self.probe.inputs[tested]
         sizes = np.array([probe.size(float(v), 1e-3, positive, float(g)) for v, g in zip(own, part, strict=True)])
         direction = np.zeros(len(probe.inputs))
         mine = sizes * np.where(part < 0, -1.0, 1.0) * rng.uniform(0.5, 1.0, len(part))
-        direction[offset : offset + len(part)] = mine
+        direction[tested] = mine
         exact = probe.complex_step(direction)
         gradient = float(part @ mine)
         moved = self._rounding(direction, self.jitter @ direction, gradient, exact, abs(gradient))
@@ -215,14 +230,16 @@ class _Checked:
         return noise + LOUD * self.probe.noise(direction, exact)
 
 
-def _row(name: str, size: int, entries: Sequence[_Entry]) -> GradientRow:
+def _row(name: str, size: int, entries: Sequence[_Entry], left_out: int = 0) -> GradientRow:
     """The row of the report for some tested entries, with errors relative to the largest."""
     columns = np.array([(e.gradient, e.exact, e.rough, e.error, e.faint, e.rounding) for e in entries]).T
     gradient, exact, rough, error, faint, rounding = columns
     unfelt = bool((np.maximum(np.abs(gradient), np.abs(exact)) <= faint).all())
     scale, worst = float(np.abs(exact).max()), float(np.abs(gradient).max())
     if scale == 0.0:
-        return GradientRow(name, size, worst, worst, float(np.abs(rough).max()), worst == 0.0 or unfelt, unfelt)
+        return GradientRow(
+            name, size, worst, worst, float(np.abs(rough).max()), worst == 0.0 or unfelt, unfelt, left_out=left_out
+        )
     by_complex, by_differences = np.abs(gradient - exact), np.abs(gradient - rough)
     agrees = (by_complex <= COMPLEX_STEP_BOUND * scale + rounding).all()
     agrees &= ((by_differences <= DIFFERENCES_BOUND * scale + error) | np.isinf(error)).all()
@@ -230,7 +247,7 @@ def _row(name: str, size: int, entries: Sequence[_Entry]) -> GradientRow:
     far = float(by_differences[told].max(initial=0.0)) / scale
     passed = bool(unfelt or agrees)
     floors = float(error.max()) / scale, float(rounding.max()) / scale
-    return GradientRow(name, size, worst, float(by_complex.max()) / scale, far, passed, unfelt, *floors)
+    return GradientRow(name, size, worst, float(by_complex.max()) / scale, far, passed, unfelt, *floors, left_out)
 
 
 def _present(compiled: CompiledScene) -> list[str]:
