@@ -66,6 +66,18 @@ def test_a_recording_that_was_simulated_at_the_substep_of_the_fit_is_told_as_suc
     assert "simulated at the same substep" in "".join(fit.result.warnings)
 
 
+def test_a_knot_that_nobody_weighed_is_named_where_residuals_hardly_exceed_noise() -> None:
+    """Friction was 0.493 +/- 0.043 for 0.3, "identified", and no word: what a model lacks was looked for only where the
+    residuals' sum of squares exceeds noise by a fifth."""
+    true = dragged(0.3)
+    true.add_point_mass(int(true.ropes["rope"].particles[-1]), 1.3e-3, "knot")
+    world = sb.Solver(h=4e-4, method="implicit", integrator="bdf1", extrapolate=2)
+    found = fitted(true, dragged(0.4), ["table_friction", "rope_EI"], 1, world).result
+    assert found.misfit is not None and found.misfit.reduced_chi_square < 1.25
+    assert found["table_friction"].value > 0.45 and found["table_friction"].verdict == "doubtful"
+    assert any("more hung on the end of rope" in w for w in found.warnings)
+
+
 @pytest.mark.parametrize(("start", "seed"), [(0.4, 0), (0.19, 1)])
 def test_a_rope_that_sticks_tells_that_friction_is_large_enough(start: float, seed: int) -> None:
     fit = fitted(dragged(0.5, aside=0.0, slope=0.2), dragged(start, aside=0.0, slope=0.2), ["table_friction"], seed)

@@ -231,8 +231,9 @@ class GivenSection(Section):
     force sensors "force_size" (relative), "force_zero" (N), "torque_zero" (N m), "force_direction" (rad) and
     "force_delay" (s), "gravity_size", "recording_clock" (its frame rate), "recording_size", "drive_size" (how far what
     drives the scene moves), "load_size" (forces that are no quantities), "start_speed" (how fast a motion starts),
-    "unnamed" (masses, drag, air and pressures of a scene built by hand that are no quantities) or "isotropy" (weft over
-    warp, and other second stiffnesses, where only the first is given; relative)."""
+    "unnamed" (masses, drag, air and pressures of a scene built by hand that are no quantities), "dry_friction" (of
+    hinges that have viscosity alone, as a share of its loss) or "isotropy" (weft over warp, and other second
+    stiffnesses, where only the first is given; relative)."""
 
     sd: Finite = key(
         ...,

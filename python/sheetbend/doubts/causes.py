@@ -144,6 +144,6 @@ def of_noise(q: Array, white: float, cause: Cause, errors: Array | None) -> floa
 
 def _possible(one: Told, more: float) -> bool:
     """Whether an error of this size can be: small enough for first order, and of what is missing no less than none."""
-    if one.missing is not None and not one.unit and not one.relative:
+    if one.missing is not None and not one.relative and not (one.unit and one.signed):
         return more > 0.0 or one.signed
     return abs(more) < FARTHEST.get("" if one.relative else one.unit, np.inf)

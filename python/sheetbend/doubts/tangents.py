@@ -10,6 +10,7 @@ import numpy as np
 from .. import _core
 from ..arrays.timeseries import Array
 from ..errors import SheetbendError
+from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
 from ..quantities.quantities import Term
 
@@ -66,6 +67,25 @@ def tangents(
     if not ok:
         raise SheetbendError(core.failure)
     return np.asarray(columns)
+
+
+def residuals(problem: FitProblem, u: Array, i: int, e: Experiment, corrected: Array | None = None) -> Array:
+    """(rows,) of the i-th experiment at u (free,), on another scene with its quantities.
+
+    Args:
+        e: the experiment with that scene.
+        corrected: the experiment's corrections there (`FitProblem.corrections`).
+
+    Raises:
+        SheetbendError: the motion has no answer there.
+    """
+    theta, slots, _ = problem.known(u)
+    own, d = theta[slots[i]], e.core(problem.recordings[i], corrected)
+    core = _core.Problem(experiments=[d], theta=own, slots=[list(range(len(own)))], free=[], threads=problem.threads)
+    ok, r, _ = core.evaluate(np.zeros(0), jacobian=False)
+    if not ok:
+        raise SheetbendError(core.failure)
+    return np.asarray(r)
 
 
 def inputs_of(added: Array | Input | list[Input] | None) -> list[Input]:

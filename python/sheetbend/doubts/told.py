@@ -23,6 +23,7 @@ from ..objects.markers import Place
 from ..quantities.quantities import Quantity
 from ..recording.recording import Recording
 from ..scene.air import WIND
+from .absent_friction import OF_IT, SHARE, dry_frictions
 from .draft import drafts
 from .lead import Lead, leads
 from .losses import LOSSES
@@ -45,6 +46,7 @@ GROUPS: Mapping[str, tuple[str, tuple[float, str]]] = {
     "drive_place": ("m", STEPS["m"]),
     "draft": ("m/s", (0.2, "0.2 m/s")),  # of which people in a room hardly feel anything
     "marker_offset": ("m", STEPS["m"]),
+    "dry_friction": (OF_IT, (SHARE, f"{SHARE:g} {OF_IT}")),
     "force_size": ("", (0.01, "1 %")),
     "force_direction": ("rad", STEPS["rad"]),
     "force_delay": ("s", STEPS["s"]),
@@ -181,6 +183,9 @@ def _collect(
         for lead, column in zip(stuck_out, columns.T[behind:], strict=True):
             k, value = lengths[f"{lead.rope}_length"]
             sticking.append((lead, column + columns[:, k] / value))
+    for dry in dry_frictions(problem, u, i, corrected):
+        unit, step = GROUPS["dry_friction"]
+        yield Told(i, "dry_friction", dry.label, unit, step, dry.column, missing=dry.says)
     for error in sensor_errors(problem, u, i):
         unit = GROUPS[error.name][0]
         one = Told(i, error.name, error.label, unit, error.step, error.column, relative=not unit)
