@@ -42,6 +42,7 @@ struct ReverseOf<ApplyAirForces> {
     const Scene& scene = step.scene;
     if (scene.air.empty()) return;
     const Airflow<T> air(step);
+    const KnotWeights wind_knots = scene.wind.at(step.t_next);
     const T eta(step.bdf.eta), share(step.bdf.eta / 3.0);
     for (int i = 0; i < static_cast<int>(scene.air.size()); ++i) {
       const AirTriangle<T> at = air.at(i);
@@ -58,7 +59,7 @@ struct ReverseOf<ApplyAirForces> {
       bar.in.of(Quantity::air_normal)[i] += at_bar.normal;
       bar.in.of(Quantity::air_tangential)[i] += at_bar.tangential;
       bar.in.of(Quantity::pressure)[i] += at_bar.pressure;
-      pull_back_knots(scene.wind.at(step.t_next), at_bar.u, bar.in.of(Quantity::wind), 1, 0);
+      pull_back_knots(wind_knots, at_bar.u, bar.in.of(Quantity::wind), 1, 0);
       const Vec3<T> v_bar = T(-1.0 / 3.0) * at_bar.u, x_bar[3] = {-(at_bar.e1 + at_bar.e2), at_bar.e1, at_bar.e2};
       for (int k = 0; k < 3; ++k) {
         const int dof = scene.first_dof[scene.air[i][k]];

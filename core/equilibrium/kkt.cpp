@@ -1,9 +1,7 @@
 #include "core/equilibrium/kkt.h"
 
-#include <Eigen/OrderingMethods>
 #include <algorithm>
 #include <cmath>
-#include <span>
 #include <utility>
 
 #include "core/element/any_kind_hessian.h"
@@ -21,131 +19,10 @@ namespace {
 
 double ratio(double part, double whole) { return part == 0.0 ? 0.0 : part / whole; }
 
-// Calls f(volume, place in its gradient, dof).
-template <class F>
-void for_each_border(const Scene& scene, F&& f) {
-  for (int v = 0; v < static_cast<int>(scene.volumes.size()); ++v) {
-    const std::vector<int>& nodes = scene.volumes[v].nodes;
-    for (std::size_t i = 0; i < 3 * nodes.size(); ++i) f(v, i, scene.first_dof[nodes[i / 3]] + static_cast<int>(i % 3));
-  }
-}
-
 // How much stiffer than the geometric stiffness a row of K may be; refinement gains about as many digits per pass.
 constexpr double rigid_stiffness = 1e8;
 
 }  // namespace
-
-// Calls f(block, entry, weights, row, column) for the 9 entries of each pair of nodes of each contact's point, rows and columns being dofs.
-template <class F>
-void Kkt::for_each_contact_entry(F&& f) const {
-  for (std::size_t i = 0; i < contact_dofs_.size(); ++i) {
-    const PointDofs& p = contact_dofs_[i];
-    for (int k = 0; k < p.count; ++k)
-      for (int l = 0; l < p.count; ++l) {
-        const double weights = contacts_.empty() ? 1.0 : contacts_[i].weight[k] * contacts_[i].weight[l];
-        for (int e = 0; e < 9; ++e) f(i, e, weights, p.first[k] + e / 3, p.first[l] + e % 3);
-      }
-  }
-}
-
-// Calls f(row, column) for the pairs of numbers of each element's coordinates, -1 where fixed; the diagonal is not among them.
-template <class F>
-void Kkt::for_each_pair(const std::vector<int>& number, F&& f) const {
-  const auto pairs = [&](std::span<const int> nodes) {
-    const int dofs = 3 * static_cast<int>(nodes.size());
-    for (int a = 0; a < dofs; ++a)
-      for (int b = 0; b < dofs; ++b)
-        f(number[scene_.first_dof[nodes[a / 3]] + a % 3], number[scene_.first_dof[nodes[b / 3]] + b % 3]);
-  };
-  for (const Group& group : scene_.groups)
-    for (int item = 0; item < group.count; ++item) pairs(group.nodes(item));
-  for (const std::array<int, 3>& nodes : pressed_) pairs(nodes);
-}
-
-Kkt::Kkt(const Scene& scene) : scene_(scene), unknown_(scene.dofs(), -1), pressed_(scene.air) {
-  for (const Volume& volume : scene.volumes) {
-    for (const auto& [a, b, c] : volume.triangles)
-      pressed_.push_back({volume.nodes[a], volume.nodes[b], volume.nodes[c]});
-    border_.emplace_back(3 * volume.nodes.size());
-  }
-  for (const Contact& contact : scene.contacts)
-    for (int item = 0; item < contact.points(); ++item) {
-      if (!moves(scene, contact, item)) continue;
-      PointDofs& dofs = contact_dofs_.emplace_back(PointDofs{contact.arity, {}});
-      for (int k = 0; k < contact.arity; ++k) dofs.first[k] = scene.first_dof[contact.nodes_of(item)[k]];
-    }
-  set_pattern(order_unknowns());
-  find_positions();
-  metric_.assign(scene.dofs(), 1.0);
-  idle_.resize(scene.directors.size());
-  idle_stiffness_.resize(scene.directors.size());
-  H_.resize(position_.size());
-  J_.resize(scene.gradient_entries);
-  softened_.resize(scene.constraints);
-  factor_.analyzePattern(K_);
-}
-
-// Numbers the unknowns in the order of elimination, and returns the entries of K on and above the diagonal, without its border.
-std::vector<Eigen::Triplet<double>> Kkt::order_unknowns() {
-  std::vector<int> free_dof(scene_.dofs(), -1);
-  for (int n = 0; n < scene_.nodes(); ++n)
-    if (scene_.role[n] == Role::free)
-      for (int d = 0; d < scene_.dim[n]; ++d) free_dof[scene_.first_dof[n] + d] = free_++;
-  std::vector<Eigen::Triplet<double>> entries, upper;
-  for (int i = 0; i < free_; ++i) entries.emplace_back(i, i, 1.0);
-  for_each_contact_entry([&](std::size_t, int, double, int row, int column) {
-    entries.emplace_back(free_dof[row], free_dof[column], 1.0);
-  });
-  for_each_pair(free_dof, [&](int a, int b) {
-    if (a >= 0 && b >= 0) entries.emplace_back(a, b, 1.0);
-  });
-  Eigen::SparseMatrix<double> graph(free_, free_);
-  graph.setFromTriplets(entries.begin(), entries.end());
-  Eigen::PermutationMatrix<Eigen::Dynamic> order;  // order(new) = old
-  Eigen::AMDOrdering<int>()(graph, order);
-  std::vector<int> place(free_);
-  for (int i = 0; i < free_; ++i) place[order.indices()(i)] = i;
-  for (int i = 0; i < scene_.dofs(); ++i)
-    if (free_dof[i] >= 0) unknown_[i] = place[free_dof[i]];
-  for (const auto& e : entries)
-    if (place[e.row()] <= place[e.col()]) upper.emplace_back(place[e.row()], place[e.col()], 1.0);
-  return upper;
-}
-
-// K with these entries and those of the volumes' border.
-void Kkt::set_pattern(std::vector<Eigen::Triplet<double>> upper) {
-  const int unknowns = free_ + static_cast<int>(scene_.volumes.size());
-  for_each_border(scene_, [&](int v, std::size_t, int dof) {
-    if (unknown_[dof] >= 0) upper.emplace_back(unknown_[dof], free_ + v, 1.0);
-  });
-  for (int i = free_; i < unknowns; ++i) upper.emplace_back(i, i, 1.0);
-  K_.resize(unknowns, unknowns);
-  K_.setFromTriplets(upper.begin(), upper.end());
-}
-
-// Where in K's values each part's entries stand.
-void Kkt::find_positions() {
-  const auto position = [&](int row, int column) {
-    const int *begin = K_.innerIndexPtr() + K_.outerIndexPtr()[column],
-              *end = K_.innerIndexPtr() + K_.outerIndexPtr()[column + 1];
-    return static_cast<int>(std::lower_bound(begin, end, row) - K_.innerIndexPtr());
-  };
-  const auto position_above = [&](int a, int b) { return a >= 0 && a <= b ? position(a, b) : -1; };
-  for_each_pair(unknown_, [&](int a, int b) { position_.push_back(position_above(a, b)); });
-  for (int i = 0; i < K_.rows(); ++i) diagonal_.push_back(position(i, i));
-  for_each_contact_entry([&](std::size_t, int, double, int row, int column) {
-    contact_position_.push_back(position_above(unknown_[row], unknown_[column]));
-  });
-  for (const Director& d : scene_.directors)
-    for (int e = 0; e < 9; ++e) {
-      const int first = scene_.first_dof[d.node];
-      director_position_.push_back(position_above(unknown_[first + e / 3], unknown_[first + e % 3]));
-    }
-  for (const std::vector<double>& border : border_) border_position_.emplace_back(border.size());
-  for_each_border(scene_, [&](int v, std::size_t i, int dof) {
-    border_position_[v][i] = unknown_[dof] >= 0 ? position(unknown_[dof], free_ + v) : -1;
-  });
-}
 
 void Kkt::assemble(const double* inputs, const double* x, const double* lambda, double force_stiffness,
                    const std::vector<RedundantRow>& left_out) {
@@ -168,6 +45,12 @@ void Kkt::assemble(const double* inputs, const double* x, const double* lambda, 
     const std::size_t dofs = 3 * static_cast<std::size_t>(group.arity);
     std::fill_n(&J_[group.first_gradient + (r.row - group.first_row) * dofs], dofs, 0.0);
   }
+  press(in, x, lambda, H);
+  measure_idle(in, x);
+}
+
+// H of what is under pressure, from here on, and the gradients of the kept volumes.
+void Kkt::press(const Inputs<const double>& in, const double* x, const double* lambda, double* H) {
   const double* given = in.of(Quantity::pressure);
   std::vector<double> pressures(given, given + scene_.air.size());
   std::vector<Vec3<double>> gradient;
@@ -178,6 +61,10 @@ void Kkt::assemble(const double* inputs, const double* x, const double* lambda, 
   }
   for (std::size_t i = 0; i < pressed_.size(); ++i, H += 81)
     pressure_hessian(corners_at(scene_, pressed_[i], x), pressures[i], H);
+}
+
+// The directions of directors that nothing depends on, and the metric.
+void Kkt::measure_idle(const Inputs<const double>& in, const double* x) {
   for (std::size_t i = 0; i < scene_.directors.size(); ++i) {
     const Director& d = scene_.directors[i];
     const auto at = [&](int node) { return x + scene_.first_dof[node]; };
@@ -202,15 +89,41 @@ void Kkt::assemble(const double* inputs, const double* x, const double* lambda, 
 bool Kkt::factorize(double mu, const double* compliance) {
   mu_ = mu;
   alpha_.assign(compliance, compliance + scene_.constraints + scene_.volumes.size());
+  std::fill_n(K_.valuePtr(), K_.nonZeros(), 0.0);
+  add_geometric_stiffness();
+  add_elastic_stiffness();
   double* values = K_.valuePtr();
-  std::fill_n(values, K_.nonZeros(), 0.0);
+  const int* at = contact_position_.data();
+  for_each_contact_entry([&](std::size_t i, int e, double weights, int, int) {
+    if (const int own = *at++; own >= 0) values[own] += weights * contacts_[i].symmetric[e];
+  });
+  hold_idle();
+  largest_diagonal_ = 0.0;
+  for (int i = 0; i < free_; ++i) largest_diagonal_ = std::max(largest_diagonal_, std::abs(values[diagonal_[i]]));
+  for_each_border([&](int v, std::size_t i, int) {
+    if (border_position_[v][i] >= 0) values[border_position_[v][i]] = -border_[v][i];
+  });
+  for (std::size_t v = 0; v < border_.size(); ++v) values[diagonal_[free_ + v]] = -alpha_[scene_.constraints + v];
+  factor_.factorize(K_);
+  if (factor_.info() != Eigen::Success || !factor_.vectorD().allFinite()) return false;
+  negative_ = static_cast<int>((factor_.vectorD().array() < 0.0).count() - border_.size());
+  return !slides_ || factorize_whole();
+}
+
+// mu - H
+void Kkt::add_geometric_stiffness() {
+  double* values = K_.valuePtr();
   for (std::size_t e = 0; e < H_.size(); ++e)
     if (position_[e] >= 0) values[position_[e]] -= H_[e];
-  geometric_ = std::max(force_stiffness_, mu);
+  geometric_ = std::max(force_stiffness_, mu_);
   for (int i = 0; i < free_; ++i) geometric_ = std::max(geometric_, std::abs(values[diagonal_[i]]));
   for (int i = 0; i < scene_.dofs(); ++i)
-    if (unknown_[i] >= 0) values[diagonal_[unknown_[i]]] += mu * metric_[i];
+    if (unknown_[i] >= 0) values[diagonal_[unknown_[i]]] += mu_ * metric_[i];
+}
 
+// J^T alpha^-1 J, with rigid rows softened.
+void Kkt::add_elastic_stiffness() {
+  double* values = K_.valuePtr();
   const int* position = position_.data();
   const double* J = J_.data();
   for_each_constraint(scene_, [&](const Group& group, int item) {
@@ -230,10 +143,11 @@ bool Kkt::factorize(double mu, const double* compliance) {
       }
     J += rows * dofs;
   });
-  const int* at = contact_position_.data();
-  for_each_contact_entry([&](std::size_t i, int e, double weights, int, int) {
-    if (const int own = *at++; own >= 0) values[own] += weights * contacts_[i].symmetric[e];
-  });
+}
+
+// Stiffness in the directions of directors that nothing depends on, as large as that of their other directions.
+void Kkt::hold_idle() {
+  double* values = K_.valuePtr();
   for (std::size_t i = 0; i < idle_.size(); ++i) {
     const int* at = &director_position_[9 * i];
     if (at[0] < 0) continue;
@@ -241,16 +155,6 @@ bool Kkt::factorize(double mu, const double* compliance) {
     for (int e = 0; e < 9; ++e)
       if (at[e] >= 0) values[at[e]] += idle_stiffness_[i] * idle_[i][e];
   }
-  largest_diagonal_ = 0.0;
-  for (int i = 0; i < free_; ++i) largest_diagonal_ = std::max(largest_diagonal_, std::abs(values[diagonal_[i]]));
-  for_each_border(scene_, [&](int v, std::size_t i, int) {
-    if (border_position_[v][i] >= 0) values[border_position_[v][i]] = -border_[v][i];
-  });
-  for (std::size_t v = 0; v < border_.size(); ++v) values[diagonal_[free_ + v]] = -alpha_[scene_.constraints + v];
-  factor_.factorize(K_);
-  if (factor_.info() != Eigen::Success || !factor_.vectorD().allFinite()) return false;
-  negative_ = static_cast<int>((factor_.vectorD().array() < 0.0).count() - border_.size());
-  return !slides_ || factorize_whole();
 }
 
 void Kkt::take_contacts(std::vector<ContactBlock> blocks) {
@@ -352,7 +256,7 @@ void Kkt::subtract_product(const std::vector<double>& x, const std::vector<doubl
       if (unknown_[dof] < 0) continue;
       for (int b = 0; b < 9; ++b) r_x[dof] -= H[b] * x[scene_.first_dof[nodes[b / 3]] + b % 3];
     }
-  for_each_border(scene_, [&](int v, std::size_t i, int dof) {
+  for_each_border([&](int v, std::size_t i, int dof) {
     if (unknown_[dof] >= 0) r_x[dof] -= border_[v][i] * lambda[scene_.rows + v];
     r_l[scene_.rows + v] -= border_[v][i] * x[dof];
   });

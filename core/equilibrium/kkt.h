@@ -60,16 +60,25 @@ class Kkt {
  private:
   using Factor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Upper, Eigen::NaturalOrdering<int>>;
 
+  // kkt_pattern.cpp
   template <class F>
   void for_each_pair(const std::vector<int>& number, F&& f) const;
   std::vector<Eigen::Triplet<double>> order_unknowns();
   void set_pattern(std::vector<Eigen::Triplet<double>> upper);
   void find_positions();
+
+  void press(const Inputs<const double>& in, const double* x, const double* lambda, double* H);
+  void measure_idle(const Inputs<const double>& in, const double* x);
+  void add_geometric_stiffness();
+  void add_elastic_stiffness();
+  void hold_idle();
   void condensed_solve(const std::vector<double>& b_x, const std::vector<double>& b_l, bool transposed,
                        std::vector<double>& x, std::vector<double>& lambda) const;
   bool factorize_whole();
   template <class F>
   void for_each_contact_entry(F&& f) const;
+  template <class F>
+  void for_each_border(F&& f) const;
   void subtract_product(const std::vector<double>& x, const std::vector<double>& lambda, bool transposed,
                         std::vector<double>& r_x, std::vector<double>& r_l) const;
 
@@ -100,5 +109,28 @@ class Kkt {
   Factor factor_;
   std::unique_ptr<Eigen::SparseLU<Eigen::SparseMatrix<double>>> whole_;  // of K with what slides
 };
+
+// Calls f(block, entry, weights, row, column) for the 9 entries of each pair of nodes of each contact's point, rows and columns being dofs.
+template <class F>
+void Kkt::for_each_contact_entry(F&& f) const {
+  for (std::size_t i = 0; i < contact_dofs_.size(); ++i) {
+    const PointDofs& p = contact_dofs_[i];
+    for (int k = 0; k < p.count; ++k)
+      for (int l = 0; l < p.count; ++l) {
+        const double weights = contacts_.empty() ? 1.0 : contacts_[i].weight[k] * contacts_[i].weight[l];
+        for (int e = 0; e < 9; ++e) f(i, e, weights, p.first[k] + e / 3, p.first[l] + e % 3);
+      }
+  }
+}
+
+// Calls f(volume, place in its gradient, dof).
+template <class F>
+void Kkt::for_each_border(F&& f) const {
+  for (int v = 0; v < static_cast<int>(scene_.volumes.size()); ++v) {
+    const std::vector<int>& nodes = scene_.volumes[v].nodes;
+    for (std::size_t i = 0; i < 3 * nodes.size(); ++i)
+      f(v, i, scene_.first_dof[nodes[i / 3]] + static_cast<int>(i % 3));
+  }
+}
 
 }  // namespace sheetbend

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import sheetbend as sb
 from sheetbend.mesh import grid, icosphere
+from support import unit_vector
 
 Array = np.ndarray
 Draw = np.random.Generator
@@ -25,11 +26,6 @@ FRICTIONS = (0.0, 0.05, 0.3, 1.0)
 # What a direction changes by 1: m, m/s, m/s^2; everything else by its own size.
 UNITS = {"position": 1e-2, "velocity": 0.1, "gravity": 0.3, "collider_pose": 1e-2, "boundary": 1e-2}
 FIELD = icosphere(0.06, 2)
-
-
-def unit(rng: Draw) -> Array:
-    v = rng.standard_normal(3)
-    return np.asarray(v / np.linalg.norm(v))
 
 
 def shape(rng: Draw, name: str) -> tuple[sb.Collider, str]:
@@ -42,7 +38,7 @@ def shape(rng: Draw, name: str) -> tuple[sb.Collider, str]:
     if kind == "plane":
         made = sb.Plane(name=name)
     elif kind == "tilted":
-        made = sb.Plane(point=(0, 0, 0), normal=unit(rng) * 0.4 + [0, 0, 1], name=name)
+        made = sb.Plane(point=(0, 0, 0), normal=unit_vector(rng) * 0.4 + [0, 0, 1], name=name)
     elif kind == "sphere":
         made = sb.Sphere(center=center, radius=size, name=name)
     elif kind == "capsule":

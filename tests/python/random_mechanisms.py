@@ -14,6 +14,7 @@ import warnings
 import numpy as np
 import sheetbend as sb
 from sheetbend.motion.core_terms import divergence
+from support import unit_vector
 
 BODIES, ROPES = 4, 2  # at most
 H, SUBSTEPS = 2e-3, 6
@@ -24,11 +25,6 @@ Draw = np.random.Generator
 
 def some(rng: Draw, chance: float) -> bool:
     return bool(rng.random() < chance)
-
-
-def direction(rng: Draw) -> np.ndarray:
-    v = rng.standard_normal(3)
-    return v / np.linalg.norm(v)
 
 
 def hinge(rng: Draw, upper: sb.Body | None, lower: sb.Body, at: np.ndarray, name: str, smooth: bool) -> sb.Joint:
@@ -48,7 +44,7 @@ def hinge(rng: Draw, upper: sb.Body | None, lower: sb.Body, at: np.ndarray, name
         more |= {"torque": (knots, rng.uniform(-0.05, 0.05, 3)), "rotor": 1e-5}
     elif some(rng, 0.2) and "stiffness" not in more and "viscosity" not in more:
         more["servo"] = (knots, np.append(0.0, rng.uniform(-0.02, 0.02, 2)))
-    return sb.hinge(upper, lower, at=at, axis=direction(rng), name=name, rate=rng.uniform(-2, 2), **more)
+    return sb.hinge(upper, lower, at=at, axis=unit_vector(rng), name=name, rate=rng.uniform(-2, 2), **more)
 
 
 def joint(rng: Draw, upper: sb.Body | None, lower: sb.Body, at: np.ndarray, name: str, smooth: bool) -> str:
@@ -58,13 +54,13 @@ def joint(rng: Draw, upper: sb.Body | None, lower: sb.Body, at: np.ndarray, name
     elif kind in ("ball", "mount"):
         sb.ball(upper, lower, at=at, name=name, compliance=1e-4 if kind == "mount" else None)
     elif kind == "universal":
-        a = direction(rng)
-        sb.universal(upper, lower, at=at, axes=(a, np.cross(a, direction(rng))), name=name)
+        a = unit_vector(rng)
+        sb.universal(upper, lower, at=at, axes=(a, np.cross(a, unit_vector(rng))), name=name)
     elif kind == "slider":
         more = {"limits": (-rng.uniform(1e-4, 0.02), rng.uniform(1e-4, 0.02))} if some(rng, 0.5) else {}
-        sb.slider(upper, lower, at=at, axis=direction(rng), name=name, rate=rng.uniform(-0.5, 0.5), **more)
+        sb.slider(upper, lower, at=at, axis=unit_vector(rng), name=name, rate=rng.uniform(-0.5, 0.5), **more)
     elif kind == "cylinder":
-        sb.cylinder(upper, lower, at=at, axis=direction(rng), name=name, rate=0.2, turn_rate=rng.uniform(-2, 2))
+        sb.cylinder(upper, lower, at=at, axis=unit_vector(rng), name=name, rate=0.2, turn_rate=rng.uniform(-2, 2))
     else:
         sb.fixed(upper, lower, at=at, name=name)
     return kind
@@ -77,7 +73,7 @@ def hang(rng: Draw, scene: sb.Scene, body: sb.Body, at: np.ndarray, kind: str, n
         sb.attach(body, rope.particles[:1], name=f"{name}_held")
     elif kind == "rod":
         origin, frame = body.pose(scene.nodes)
-        start = body.point(frame.T @ (at - origin), along=frame.T @ direction(rng))
+        start = body.point(frame.T @ (at - origin), along=frame.T @ unit_vector(rng))
         sb.add_rod(scene, name, length=0.1, segments=4, density=0.05, EI=1e-3, GJ=1e-3, EA=1e2, start=start)
     elif kind == "cloth":
         mesh = sb.mesh.grid(0.1, 0.1, 3, 3)
@@ -117,7 +113,7 @@ def scene_of(seed: int) -> tuple[sb.Scene, sb.Solver, str]:
         else:
             place = at + 0.01 * rng.standard_normal(3) - np.array([0.07, 0.0, 0.0])
             if some(rng, 0.1):  # a door on two hinges, of whose rows five follow from the others
-                axis = direction(rng)
+                axis = unit_vector(rng)
                 for n in (0, 1):
                     sb.hinge(upper, body, at=place + 0.05 * n * axis, axis=axis, name=f"j{k}_{n}")
                 parts.append("two hinges")

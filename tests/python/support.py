@@ -33,6 +33,12 @@ def twice(expected: ArrayLike) -> tuple[float, float]:
     return float(expected), float(expected)
 
 
+def unit_vector(rng: np.random.Generator) -> Array:
+    """(3,), of any direction."""
+    v = rng.standard_normal(3)
+    return np.asarray(v / np.linalg.norm(v))
+
+
 def place(trajectory_frames: int, scene: sb.Scene, frame: int, particle: int, axis: int, weight: float = 1.0) -> Array:
     """Weights (frames, particles, 3) that pick one coordinate of one particle at one frame."""
     weights = np.zeros((trajectory_frames, scene.particle_count, 3))

@@ -149,6 +149,11 @@ def test_a_wind_that_blows_on_nothing_is_refused() -> None:
     scene.set_wind(WIND)
     with pytest.raises(sb.SceneError, match="wind: blows on nothing"):
         sb.simulate(scene, TIMES, sb.Solver(h=1 / 240))
+    sheet = sb.cloth(sb.mesh.grid(0.2, 0.2, 2, 2), density=0.2, warp=100.0, shear=30.0)
+    sheet.add_pressure(sheet.cloths["cloth"].mesh.triangles, 1.0)
+    sheet.set_wind(WIND)
+    with pytest.raises(sb.SceneError, match="wind: blows on nothing"):
+        sb.simulate(sheet, TIMES, sb.Solver(h=1 / 240))
 
 
 CONFIG = """

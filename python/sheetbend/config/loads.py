@@ -61,9 +61,6 @@ def add_winds(scene: Scene, section: SceneSection) -> None:
     if section.wind is not None:
         with located("scene"):
             scene.set_wind(section.wind.velocity, section.wind.times)
-        if not scene.has_drag and not any(cloth.in_air for cloth in section.cloth):
-            fix = "give air_normal to a [[scene.cloth]], or drag to what it blows on (drag_linear of a [[scene.rope]])"
-            raise ConfigError("scene.wind", "blows on nothing", section.wind.velocity, fix)
     for described in section.cloth:
         if not described.in_air:
             continue
@@ -71,6 +68,9 @@ def add_winds(scene: Scene, section: SceneSection) -> None:
         normal, tangential = described.air_normal or 0.0, described.air_tangential or 0.0
         with located("scene"):
             scene.add_air(cloth.particles[cloth.mesh.triangles], normal, tangential, name=cloth.name)
+    if section.wind is not None:
+        with located("scene"):
+            scene.air.expect_blown(scene.has_drag)
 
 
 def add_unknown_inputs(

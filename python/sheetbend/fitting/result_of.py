@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,7 +29,7 @@ from ..minimum.fine_meshes import at_the_limit
 from ..minimum.smooth import Field
 from ..report.dependence import with_dependences
 from ..report.fit_result import FitResult
-from ..result.motions import RecordingFit
+from ..result.motions import ContactFit, RecordingFit
 from .conclusion import Conclusion
 from .reached import Reached
 from .rows import curves, every_end, given_rows, growth_rows, recording_fit, start_rows
@@ -90,14 +90,8 @@ def result_of(
     searched = sum(m.evaluations for m in reached.ends), sum(m.jacobians for m in reached.ends)
     evaluations, jacobians = clock.since()
     contacts = what_touches(at.problem, at.u)
-    warnings = (
-        *warnings_of([m for m, _ in each], interrupted, problem, estimates, ahead),
-        *conclusion.warnings,
-        *at.warnings,
-        *pressed_in(at.problem, at.u, contacts),
-        *outside(conclusion.experiments, conclusion.values),
-        *(() if interrupted else (*misread(problem, best.u), *misread_forces(problem, best.u), *implausible(problem))),
-    )
+    ended = warnings_of([m for m, _ in each], interrupted, problem, estimates, ahead)
+    warnings = tuple(_warnings(reached, conclusion, contacts, interrupted))
     found_fields = Fields(at.problem, at.u, fields)
     baselines = (c.baseline_words for c in (*comparisons, *left_out.values()) if c.baseline_words)
     result = FitResult(
@@ -138,9 +132,24 @@ def result_of(
         evaluations=searched[0],
         jacobians=searched[1],
         judging=(evaluations - searched[0], jacobians - searched[1]),
-        warnings=warnings,
+        warnings=(*ended, *warnings),
     )
     return replace(result, estimates=with_dependences(result))
+
+
+def _warnings(
+    reached: Reached, conclusion: Conclusion, contacts: Sequence[ContactFit], interrupted: bool
+) -> Iterator[str]:
+    """What the conclusion warns of, contacts that press in, and recordings and forces that seem misread."""
+    problem, best, at = reached.problem, reached.best, conclusion.at
+    yield from conclusion.warnings
+    yield from at.warnings
+    yield from pressed_in(at.problem, at.u, contacts)
+    yield from outside(conclusion.experiments, conclusion.values)
+    if not interrupted:
+        yield from misread(problem, best.u)
+        yield from misread_forces(problem, best.u)
+        yield from implausible(problem)
 
 
 def _recordings(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,16 +11,12 @@ import numpy as np
 from ..errors import RecordingError
 from . import robot
 from .beginning import lets_go
-from .cloth_held import SAGS, SIDES, Hold, holds, row_of, share, slung
+from .cloth_held import SIDES, Hold
 from .cloth_parts import cloth_parts
-from .cloth_sheet import Sheet
+from .cloth_sheet import AIR, Sheet, sheet_of
 from .cloth_words import lies_over, seen_of, unknown_of
 from .folded import folded
-from .lattice import in_rows
-from .margin import margin, pitches
 from .seen import Seen
-from .sheet import flattened, placed, spacing
-from .slung import slack
 from .take import Description, Measured, Take, max_gap
 from .text import joined, table
 from .unseen import Freed, freed, moves_first
@@ -29,9 +25,6 @@ Array = np.ndarray
 CELLS = 10  # along the longer side
 WHOLE = 0.8  # share of the markers that must hang together as one sheet
 WARP, SHEAR = 500.0, 100.0  # N/m per kg/m^2, to start from
-ASKEW = 0.15  # slope at which a cloth hangs that a wind blows on
-AIR = 0.7  # kg/m^3, of a plate across the wind: half the density of air times a drag coefficient of 1.2
-PLANE = 1.5  # times the noise, by which markers are off a plane at most that a cloth starts in
 SUBSTEP = 1 / 250  # s, at most
 GUESS = 0.5  # standard deviation of what is assumed without a measurement, relative
 SIZE = 0.01  # standard deviation of the flat size that markers on a stretched cloth show, relative
@@ -68,10 +61,10 @@ def _described(takes: Sequence[Take], measured: Measured, stands: bool) -> Descr
             "configuration by hand",
         )
     sheets, notes, unknown = [], list[str](), list[str]()
-    first = (_looked_at(s, name, own, others, density, {}, Measured()) for name, own in cloths.items())
+    first = (sheet_of(s, name, own, others, density, {}, Measured()) for name, own in cloths.items())
     bars = _bars([sheet for sheet in first if sheet is not None])
     for name, own in cloths.items():
-        sheet = _looked_at(s, name, own, others, density, bars, measured)
+        sheet = sheet_of(s, name, own, others, density, bars, measured)
         if sheet is None:
             unknown.append(lies_over(names, own, "the middle of their cloth is above two of its sides"))
             continue
@@ -130,121 +123,6 @@ def _bars(sheets: Sequence[Sheet]) -> dict[int, tuple[float, ...]]:
             bar, rows = np.array(hold.bar), shown.setdefault(hold.markers[0], [])
             rows.append(bar * (np.sign(bar @ rows[0]) if rows else 1.0))
     return {k: tuple(np.median(rows, axis=0).tolist()) for k, rows in shown.items()}
-
-
-def _on_tool(s: Seen, own: list[int], flat: Array, held: list[Hold], poses: robot.Poses) -> tuple[Hold, robot.Riding]:
-    """How a tool holds the upper edge of a cloth whose own upper row shows it, and what rides on it: the edge itself,
-    where the motion of the rows tells where it is, else the upper row."""
-    hold, *more = held
-    if more or not hold.own or hold.corners or not hold.moves:
-        names = [s.recording.markers[k] for h in held for k in h.markers]
-        fix = "leave out the poses, or write the configuration by hand, as in docs/configuration.md"
-        raise RecordingError("poses", "go with a cloth whose whole upper edge moves", joined(names), fix)
-    x, t = s.recording.positions, s.recording.times
-    row = list(hold.markers)
-    ride = robot.riding(x[:, row], t, poses)
-    told = margin(x[:, own], flat, *SIDES[hold.side], lambda edge: robot.off_near(edge, t, poses, ride.shift))
-    if told.edge is not None:
-        ride = robot.riding(told.edge.points, t, poses)
-    return replace(hold, tool=robot.TOOL, beyond=told.length, margin=told), ride
-
-
-def _looked_at(
-    s: Seen,
-    name: str,
-    own: list[int],
-    others: Sequence[int],
-    density: float,
-    bars: Mapping[int, tuple[float, ...]],
-    measured: Measured,
-) -> Sheet | None:
-    """A cloth; None where something lies under it. Bars point where its rows beside them do, if not given."""
-    r = s.recording
-    apart = s.apart[np.ix_(own, own)]
-    flat = flattened(apart)
-    rows = in_rows(apart, flat)
-    flat = flat if rows is None else rows
-    start = int(np.argmax(r.mask[:, own].sum(axis=1)))
-    up = -s.gravity / np.linalg.norm(s.gravity)
-    place, axes, flat = placed(flat, r.positions[start, own], up)
-    axis, rise = slung(r.positions[:, own], flat, up, spacing(apart))
-    if rise < -SAGS:
-        return None
-    is_slung = rise > SAGS
-    if is_slung and axis == 1:  # from now on x runs from one held side to the other
-        place = place + axes[0] * np.ptp(flat[:, 0])
-        flat = np.stack([flat[:, 1], np.ptp(flat[:, 0]) - flat[:, 0]], axis=1)
-        axes = np.stack([axes[1], -axes[0]])
-    found = slack(s, own, flat, spacing(apart)) if is_slung else None
-    if found is not None:
-        flat = flat * [found.length / np.ptp(flat[:, 0]), 1.0]
-    held = holds(s, own, flat, others, ("left", "right") if is_slung else ("top",), bars)
-    ride = None
-    if measured.poses is not None:
-        hold, ride = _on_tool(s, own, flat, held, measured.poses)
-        held = [hold]
-    beyond = {hold.side: hold.beyond for hold in held}
-    if found is not None:  # the cloth is stretched there too
-        beyond |= {side: beyond[side] * found.length / found.first for side in ("left", "right") if side in beyond}
-    free, margin = share(held) * pitches(flat), None
-    if measured.margin is not None:  # beyond all outer rows but those beside an edge that is known
-        shown = {h.side for h in held if h.edge is not None or not h.own or (h.moves and not h.corners)}
-        margin, free = tuple(0.0 if side in shown else measured.margin for side in SIDES), 0.0 * free
-        beyond = {side: off for side, off in beyond.items() if side in shown}
-    low, high = (
-        np.array([beyond.get(side, free[SIDES[side][0]]) for side in sides])
-        for sides in (("left", "bottom"), ("right", "top"))
-    )
-    width, height = (np.ptp(flat, axis=0) + low + high).tolist()
-    at_rest = not s.static and not any(hold.moves for hold in held) and not is_slung
-    wind = _wind(s, own, [own[k] for k in row_of(flat, held[0].side, spacing(apart))], up, density) if at_rest else None
-    origin = place - axes.T @ low
-    for edge in (hold.edge for hold in held if ride is None and not is_slung):
-        if edge is not None:  # all frames show an edge at rest
-            origin = np.nanmean(edge.points, axis=(0, 1)) - axes.T @ [edge.along.mean() + low[0], height]
-    rests = not any(hold.moves for hold in held) and not is_slung  # a grip starts where its markers are
-    starts_flat = rests and not s.static and _lies_flat(s, own)
-    return Sheet(
-        name=name,
-        own=own,
-        flat=flat + low,
-        width=width,
-        height=height,
-        low=low,
-        origin=origin,
-        axes=axes,
-        held=held,
-        static=s.static,
-        slung=is_slung,
-        starts_flat=starts_flat,
-        slack=found,
-        wind=wind,
-        margin=margin,
-        ride=ride,
-    )
-
-
-def _lies_flat(s: Seen, own: list[int]) -> bool:
-    """Whether markers lie in a plane in the first frame, but for their noise."""
-    x = s.recording.positions[0, own]
-    x = x[np.isfinite(x[:, 0])]
-    if len(x) < 4:
-        return False
-    off = np.linalg.svd(x - x.mean(axis=0), compute_uv=False)[2] / np.sqrt(len(x) - 3)
-    return bool(off < max(PLANE * s.noise, 1e-3 * np.linalg.norm(np.ptp(x, axis=0))))
-
-
-def _wind(s: Seen, own: list[int], row: list[int], up: Array, density: float) -> Array | None:
-    """m/s, of a wind that balances the weight of a cloth that leans by as much on average, about half of the time."""
-    x = s.recording.positions[len(s.recording.times) // 2 :]
-    lean = np.nanmean(x[:, own], axis=(0, 1)) - np.nanmean(x[:, row], axis=(0, 1))
-    drop = float(-lean @ up)
-    across = lean + drop * up
-    slope = float(np.linalg.norm(across)) / max(drop, 1e-9)
-    if drop <= 0 or slope < ASKEW:
-        return None
-    speed = np.sqrt(density * float(np.linalg.norm(s.gravity)) * slope / AIR)
-    return np.asarray(speed * across / np.linalg.norm(across))
 
 
 def _lines(

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import MeshError
 from ..files.units import METERS
 from ..mesh import read_mesh
-from .cloth import AIR
+from .cloth_sheet import AIR
 from .draft import Draft, written
 from .take import Measured
 from .text import table

@@ -27,6 +27,8 @@ from .stiffness_field import StiffnessField, field_of_triangles
 from .yielding import check_yield
 
 MESH = "give a TriangleMesh, such as sb.mesh.equilateral(...) or sb.read_mesh(path)"
+NEEDED = ("density", "warp", "shear")  # numbers of a fabric that have to be given
+NOT_POSITIVE = ("poisson", "law", "bending_model", "yield_share", "yield_shear_share")
 MODELS = ("curvature", "dihedral", "isometric_bending")
 
 
@@ -178,19 +180,28 @@ def add_cloth(
     check_label("cloth.name", name)
     check_scene(scene)
     check_kind(f"{name}.mesh", mesh, TriangleMesh, MESH, SceneError)
-    if not isinstance(law, Law | None):
-        raise SceneError(f"{name}.law", "is no law", law, "give such as sb.laws.Sinh(warp, weft, shear)")
-    needed = {"density": density, "warp": warp, "shear": shear}
-    optional = {"weft": weft, "bending": bending, "bending_weft": bending_weft, "bending_twist": bending_twist}
-    optional |= {"membrane_damping": membrane_damping, "bend_damping": bend_damping}
-    optional |= {"yield_curvature": yield_curvature, "yield_shear": yield_shear}
-    optional |= {"drag_linear": drag_linear, "drag_quadratic": drag_quadratic}
-    check_positive(name, needed, optional)
     fabric = fabric or name
-    check_yield(name, yield_curvature, yield_share, "the bending stiffness")
-    check_yield(name, yield_shear, yield_shear_share, "the shear stiffness", ("yield_shear", "yield_shear_share"))
-    named = {"poisson": poisson, "law": law or Linear(), "bending_model": bending_model}
-    numbers = needed | optional | named | {"yield_share": yield_share, "yield_shear_share": yield_shear_share}
+    numbers = {
+        "density": density,
+        "warp": warp,
+        "shear": shear,
+        "weft": weft,
+        "bending": bending,
+        "bending_weft": bending_weft,
+        "bending_twist": bending_twist,
+        "membrane_damping": membrane_damping,
+        "bend_damping": bend_damping,
+        "yield_curvature": yield_curvature,
+        "yield_shear": yield_shear,
+        "drag_linear": drag_linear,
+        "drag_quadratic": drag_quadratic,
+        "poisson": poisson,
+        "law": Linear() if law is None else law,
+        "bending_model": bending_model,
+        "yield_share": yield_share,
+        "yield_shear_share": yield_shear_share,
+    }
+    _check_each(name, numbers)
     _check_cut(scene, name, fabric, numbers)
     _check_together(name, numbers)
     check = partial(finite, shape=mesh.vertices.shape, error=SceneError)
@@ -215,6 +226,17 @@ def add_cloth(
     built = Cloth(name, mesh, particles, fabric, numbers, {"warp_size": warp_size, "weft_size": weft_size}, varying)
     scene.cloths[name] = built
     return built
+
+
+def _check_each(name: str, numbers: Mapping[str, Any]) -> None:
+    """Refuse numbers of a fabric that are none of what they should be."""
+    if not isinstance(numbers["law"], Law):
+        raise SceneError(f"{name}.law", "is no law", numbers["law"], "give such as sb.laws.Sinh(warp, weft, shear)")
+    positive = {key: value for key, value in numbers.items() if key not in NOT_POSITIVE}
+    check_positive(name, {key: positive.pop(key) for key in NEEDED}, positive)
+    check_yield(name, numbers["yield_curvature"], numbers["yield_share"], "the bending stiffness")
+    at, share = fields = "yield_shear", "yield_shear_share"
+    check_yield(name, numbers[at], numbers[share], "the shear stiffness", fields)
 
 
 def _check_cut(scene: Scene, name: str, fabric: str, numbers: Mapping[str, Any]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = np.ndarray
+Layer = Callable[[int], None]
+"""Draws a frame."""
 SUFFIXES = (".gif", ".mp4")
 MOST_FRAMES, RATE = {".gif": 75, ".mp4": 750}, 25.0  # drawn at most; and per second at most
 _DPI = {".gif": 100, ".mp4": 160}
@@ -110,68 +112,111 @@ def _chosen(times: Array, most: int) -> Array:
     return np.unique(np.linspace(0, len(times) - 1, min(wanted, most, len(times))).round().astype(int))
 
 
-def _picture(motion: Motion, shown: Array, title: str) -> tuple[Figure, Any]:
-    """The figure, and what draws a frame of it."""
-    art = require("mpl_toolkits.mplot3d.art3d", "plot")
+def _picture(motion: Motion, shown: Array, title: str) -> tuple[Figure, Layer]:
+    """The figure, and what draws a frame of it: one layer after the other, what is measured in front."""
     figure = new_figure(7.2, 5.4, title or " ")
-    panel: Any = figure.add_subplot(projection="3d", computed_zorder=False)  # what is measured stays in front
-    cloths = motion.scene.sheets
-    strains = {
-        c.name: {k: 1e2 * largest_strain(c.mesh, motion.positions[k, c.particles]) for k in shown} for c in cloths
-    }
-    sheets = []
-    if strains:
-        every = np.concatenate([values for own in strains.values() for values in own.values()])
-        sparse = sum(len(c.mesh.triangles) for c in cloths) <= _WITH_EDGES
-        shades = np.append(np.minimum(every, np.quantile(every, 0.995)), 0.0)
-        colors = {**field_colors(shades), "edgecolor": GRAY, "linewidth": 0.2 if sparse else 0.05}
-        for cloth in cloths:
-            drawn = panel.add_collection3d(
-                art.Poly3DCollection(motion.positions[0, cloth.particles][cloth.mesh.triangles], **colors)
-            )
-            sheets.append((cloth, drawn))
-        bar = figure.colorbar(sheets[0][1], ax=panel, shrink=0.6, pad=0.08, aspect=24)
-        bar.set_label("largest strain [%]", color=INK, fontsize=9)
-        bar.ax.tick_params(colors=INK, labelsize=8)
-        bar.outline.set_visible(False)
-    boxes = body_lines(motion.scene, motion.positions)
-    solids = [
-        (lines, panel.add_collection3d(art.Line3DCollection(lines[0], colors=GRAY, linewidth=0.5, zorder=0)))
-        for lines in (*collider_lines(motion.scene, motion.times, motion.positions).values(), *boxes.values())
+    panel: Any = figure.add_subplot(projection="3d", computed_zorder=False)
+    scene, solids = motion.scene, _solid_lines(motion)
+    layers = [
+        _sheets(figure, panel, motion, shown),
+        _lines(panel, solids),
+        _ropes_and_weights(panel, motion),
+        _markers(figure, panel, motion),
     ]
-    ropes = [(r.particles, panel.plot([], [], [], color=ACCENT, linewidth=1.8)[0]) for r in motion.scene.ropes.values()]
-    heavy = point_masses(motion.scene)
-    weights = panel.plot([], [], [], "o", color=INK, markersize=8, markeredgewidth=0, zorder=2)[0]
-    dots = panel.plot([], [], [], "o", color=WARM, markersize=3.2, markeredgewidth=0, zorder=10)[0]
-    off = panel.add_collection3d(art.Line3DCollection(np.zeros((1, 2, 3)), colors=INK, linewidth=1.2, zorder=9))
-    drawn_particles = np.concatenate(
-        [np.zeros(0, int), *(p.particles for p in (*motion.scene.ropes.values(), *cloths))]
-    )
-    reach = [motion.positions[shown][:, drawn_particles].reshape(-1, 3)]
-    reach += [lines[shown].reshape(-1, 3) for lines, _ in solids]
+    drawn = [np.zeros(0, int), *(p.particles for p in (*scene.ropes.values(), *scene.sheets))]
+    reach = [motion.positions[shown][:, np.concatenate(drawn)].reshape(-1, 3)]
+    reach += [lines[shown].reshape(-1, 3) for lines in solids]
     if motion.measured is not None:
         reach.append(seen_points(motion.measured[shown].reshape(-1, 3)))
-        key(figure, [("measured markers", WARM), ("line to the simulated place", INK)])
-    box_in_space(panel, np.vstack(reach), motion.scene.gravity)
+    box_in_space(panel, np.vstack(reach), scene.gravity)
     clock = figure.text(0.02, 0.02, "", color=INK, fontsize=10)
 
     def draw(frame: int) -> None:
         clock.set_text(f"{motion.times[frame]:.2f} s")
-        for cloth, drawn in sheets:
-            drawn.set_verts(motion.positions[frame, cloth.particles][cloth.mesh.triangles])
-            drawn.set_array(strains[cloth.name][frame])
-        for lines, outline in solids:
-            outline.set_segments(lines[frame])
-        weights.set_data_3d(*motion.positions[frame, heavy].T)
-        for particles, line in ropes:
-            line.set_data_3d(*motion.positions[frame, particles].T)
-        if motion.measured is not None:
-            dots.set_data_3d(*seen_points(motion.measured[frame]).T)
-            if motion.simulated is not None:
-                pairs = np.stack([motion.measured[frame], motion.simulated[frame]], axis=1)
-                off.set_segments(pairs[np.isfinite(pairs).all(axis=(1, 2))])
+        for layer in layers:
+            layer(frame)
 
     return figure, draw
+
+
+def _sheets(figure: Figure, panel: Any, motion: Motion, shown: Array) -> Layer:
+    """Cloths and solids, colored by their largest strain, with its scale."""
+    art = require("mpl_toolkits.mplot3d.art3d", "plot")
+    cloths, x = motion.scene.sheets, motion.positions
+    strains = {c.name: {k: 1e2 * largest_strain(c.mesh, x[k, c.particles]) for k in shown} for c in cloths}
+    if not cloths:
+        return lambda frame: None
+    every = np.concatenate([values for own in strains.values() for values in own.values()])
+    sparse = sum(len(c.mesh.triangles) for c in cloths) <= _WITH_EDGES
+    shades = np.append(np.minimum(every, np.quantile(every, 0.995)), 0.0)
+    colors = {**field_colors(shades), "edgecolor": GRAY, "linewidth": 0.2 if sparse else 0.05}
+    drawn = [
+        panel.add_collection3d(art.Poly3DCollection(x[0, c.particles][c.mesh.triangles], **colors)) for c in cloths
+    ]
+    bar = figure.colorbar(drawn[0], ax=panel, shrink=0.6, pad=0.08, aspect=24)
+    bar.set_label("largest strain [%]", color=INK, fontsize=9)
+    bar.ax.tick_params(colors=INK, labelsize=8)
+    bar.outline.set_visible(False)
+
+    def draw(frame: int) -> None:
+        for cloth, triangles in zip(cloths, drawn, strict=True):
+            triangles.set_verts(x[frame, cloth.particles][cloth.mesh.triangles])
+            triangles.set_array(strains[cloth.name][frame])
+
+    return draw
+
+
+def _solid_lines(motion: Motion) -> list[Array]:
+    """(frames, lines, 2, 3) m, the edges of each collider and body."""
+    colliders = collider_lines(motion.scene, motion.times, motion.positions)
+    return [*colliders.values(), *body_lines(motion.scene, motion.positions).values()]
+
+
+def _lines(panel: Any, solids: Sequence[Array]) -> Layer:
+    """Colliders and bodies."""
+    art = require("mpl_toolkits.mplot3d.art3d", "plot")
+    drawn = [
+        panel.add_collection3d(art.Line3DCollection(lines[0], colors=GRAY, linewidth=0.5, zorder=0)) for lines in solids
+    ]
+
+    def draw(frame: int) -> None:
+        for lines, outline in zip(solids, drawn, strict=True):
+            outline.set_segments(lines[frame])
+
+    return draw
+
+
+def _ropes_and_weights(panel: Any, motion: Motion) -> Layer:
+    """Ropes as lines and point masses as dots."""
+    x, heavy = motion.positions, point_masses(motion.scene)
+    ropes = [(r.particles, panel.plot([], [], [], color=ACCENT, linewidth=1.8)[0]) for r in motion.scene.ropes.values()]
+    weights = panel.plot([], [], [], "o", color=INK, markersize=8, markeredgewidth=0, zorder=2)[0]
+
+    def draw(frame: int) -> None:
+        weights.set_data_3d(*x[frame, heavy].T)
+        for particles, line in ropes:
+            line.set_data_3d(*x[frame, particles].T)
+
+    return draw
+
+
+def _markers(figure: Figure, panel: Any, motion: Motion) -> Layer:
+    """Measured markers, each with a line to its simulated place."""
+    measured, simulated = motion.measured, motion.simulated
+    if measured is None:
+        return lambda frame: None
+    art = require("mpl_toolkits.mplot3d.art3d", "plot")
+    dots = panel.plot([], [], [], "o", color=WARM, markersize=3.2, markeredgewidth=0, zorder=10)[0]
+    off = panel.add_collection3d(art.Line3DCollection(np.zeros((1, 2, 3)), colors=INK, linewidth=1.2, zorder=9))
+    key(figure, [("measured markers", WARM), ("line to the simulated place", INK)])
+
+    def draw(frame: int) -> None:
+        dots.set_data_3d(*seen_points(measured[frame]).T)
+        if simulated is not None:
+            pairs = np.stack([measured[frame], simulated[frame]], axis=1)
+            off.set_segments(pairs[np.isfinite(pairs).all(axis=(1, 2))])
+
+    return draw
 
 
 def movie_paths(path: Path, names: Sequence[str]) -> Mapping[str, Path]:

@@ -27,13 +27,16 @@ class Air:
         pressure: (n,) Pa, the plain part.
         times: (knots,) s, of the wind.
         wind: (knots, 3) m/s, its plain part.
+        blowing: times and wind as given; None without a wind.
+        resisting: whether triangles have coefficients of the air, not a pressure alone.
     """
 
     def __init__(self) -> None:
         self.triangles: Array = np.zeros((0, 3), dtype=np.int64)
         self.normal, self.tangential, self.pressure = np.zeros(0), np.zeros(0), np.zeros(0)
         self.times, self.wind = np.zeros(0), np.zeros((0, 3))
-        self._blowing: tuple[Array, Array] | None = None  # times and wind as given
+        self.blowing: tuple[Array, Array] | None = None
+        self.resisting = False
 
     def add(
         self,
@@ -55,25 +58,26 @@ class Air:
             if np.ndim(given[kind]) == 0:
                 self._name(scene, name, f"air_{kind}", k, "kg/m^3")
         self._append(corners, values)
+        self.resisting = True
 
     def blow(self, scene: Builder, wind: ArrayLike | None, times: ArrayLike | None = None) -> None:
         """Set the wind, or check that it is the one that was set (`Scene.set_wind`)."""
         if wind is None:
             if times is not None:
                 raise SceneError("wind", "is missing", None, "give it at every one of the times")
-            if self._blowing is not None:
+            if self.blowing is not None:
                 return
             wind = (0.0, 0.0, 0.0)
         t = np.zeros(1) if times is None else finite("wind.times", times, None, SceneError).ravel()
         check_increasing("wind.times", t)
         w = finite("wind", wind, (3,) if times is None else (len(t), 3), SceneError).reshape(-1, 3)
-        if self._blowing is not None:
-            before_t, before_w = self._blowing
+        if self.blowing is not None:
+            before_t, before_w = self.blowing
             if not (np.array_equal(t, before_t) and np.array_equal(w, before_w)):
                 fix = "leave it out, the wind of a scene is one, or call set_wind before add_air"
                 raise SceneError("wind", "differs from the one given before", w[0].tolist(), fix)
             return
-        self._blowing = (t, w)
+        self.blowing = (t, w)
         self.times, self.wind = t, w.copy()
         if times is None:
             for place, (quantity, velocity) in enumerate(zip(WIND, w[0], strict=True)):
@@ -100,7 +104,7 @@ class Air:
             SceneError: nothing is in air or has drag, or it changes already.
         """
         self.expect_blown(scene.has_drag)
-        if self._blowing is None:
+        if self.blowing is None:
             self.blow(scene, None)
         if len(self.times) > 1:
             fix = "give a constant wind, or none; of a wind that is given over time the quantities are the unknowns"
@@ -117,9 +121,10 @@ class Air:
         Raises:
             SceneError: nothing is in air or has drag.
         """
-        if not len(self.triangles) and not has_drag:
-            fix = "give something drag (drag_linear of a rope), or call Scene.add_air first (air_normal of a cloth)"
-            raise SceneError("wind", "blows on nothing", None, fix)
+        if not self.resisting and not has_drag:
+            wind = None if self.blowing is None else self.blowing[1].tolist()
+            fix = "give something drag (drag_linear of a rope) or air (Scene.add_air, or air_normal of a cloth)"
+            raise SceneError("wind", "blows on nothing", wind, fix)
 
     def blow_in(self, scene: Builder, shapes: Array, names: Sequence[Sequence[str]]) -> None:
         """Add to the wind quantities, three for each mode, times its shape (knots, modes) over the knots.

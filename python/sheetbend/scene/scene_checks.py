@@ -41,7 +41,7 @@ def validate(scene: SceneData) -> None:
             fix = "constrain them, pin them or leave them out"
             names = ", ".join(scene.node_in_words(place) for place in loose[:5])
             raise SceneError("particles", "are connected to nothing", names, fix)
-    if len(scene.air.times):
+    if scene.air.blowing is not None:
         scene.air.expect_blown(scene.has_drag)
     held = scene.pinned & set(scene.boundary.driven)
     if held:
