@@ -93,9 +93,9 @@ def test_a_friction_that_does_not_show_counts_in_all() -> None:
         found = sb.fit(seen(friction, 0), parameters=WANTED, profiles=False).result
         viscosity = found["hinge_viscosity"]
         assert not [w for w in found.warnings if "friction" in w] and viscosity.verdict == "identified"
-        assert viscosity.in_all is not None and abs(viscosity.value - 3e-3) < 1.15 * viscosity.in_all < 5e-4
+        assert viscosity.in_all is not None and abs(viscosity.value - 3e-3) < 0.5 * viscosity.in_all < 6e-4
         (dry,) = [p for p in found.premises if p.name == "dry friction in hinge_spring"]
-        assert dry.moved["hinge_viscosity"] == pytest.approx(-0.1 * viscosity.value, rel=0.15)
-        assert dry.words == "0.1 of the viscous loss"
+        assert dry.moved["hinge_viscosity"] == pytest.approx(-0.3 * viscosity.value, rel=0.15)
+        assert dry.words == "0.3 of the viscous loss"
     known = sb.fit(seen(0.0, 0), parameters=WANTED, profiles=False, given={"dry_friction": 0.0}).result
-    assert known["hinge_viscosity"].in_all < 0.7 * found["hinge_viscosity"].in_all
+    assert known["hinge_viscosity"].in_all < 0.3 * found["hinge_viscosity"].in_all

@@ -2,7 +2,7 @@
 
 A short recording shows how much energy a hinge loses, and hardly by what: a pendulum of three swings with 0.3 mN m of
 dry friction was fitted with a viscosity 30 % too large, "identified" to 0.6 %, and with residuals like noise. So a fit
-says what it would move if a tenth of the loss were dry friction. Where the residuals ask for more, it is named.
+says what it would move if 0.3 of the loss were dry friction. Where the residuals ask for some, it is named.
 
 Dry friction has no derivative by which it could begin, since it may stick. But while a hinge slides the torque is
 proportional to it, and one simulation with a little of it tells what it changes.
@@ -28,7 +28,7 @@ from ..scene.scene import Scene
 from .tangents import residuals
 
 DRY = {"hinge": "friction_hinge", "joint_angle": "joint_friction"}  # by viscous kind, that of dry friction
-SHARE = 0.1  # of what viscosity takes
+SHARE, TRIED = 0.3, 0.05  # of what viscosity takes: what a report tells, and what is simulated
 OF_IT = "of the viscous loss"
 
 
@@ -39,7 +39,7 @@ class Dry:
     Attributes:
         label: whose it is.
         column: what as much loss by dry friction as by viscosity would change of the experiment's residuals, to first
-            order of a tenth of that.
+            order.
         says: what a share of it says of the model.
     """
 
@@ -70,8 +70,8 @@ def dry_frictions(problem: FitProblem, u: Array, i: int, corrected: Array | None
                 continue
             rate = (steps**2).sum(axis=0) / steps.sum(axis=0) / np.median(np.diff(problem.recordings[i].times))
             torque = viscosity * rate  # takes as much energy
-            dry = replace(e, scene=_with_friction(e.scene, g, numbers, angle[0], SHARE * torque))
-            column = (residuals(problem, u, i, dry, corrected) - without) / SHARE
+            dry = replace(e, scene=_with_friction(e.scene, g, numbers, angle[0], TRIED * torque))
+            column = (residuals(problem, u, i, dry, corrected) - without) / TRIED
             yield Dry(f"dry friction in {g.name}", column, _says(g.name, float(torque[0])))
     except SheetbendError:  # a motion without an answer tells nothing
         return

@@ -184,8 +184,7 @@ def _collect(
             k, value = lengths[f"{lead.rope}_length"]
             sticking.append((lead, column + columns[:, k] / value))
     for dry in dry_frictions(problem, u, i, corrected):
-        unit, step = GROUPS["dry_friction"]
-        yield Told(i, "dry_friction", dry.label, unit, step, dry.column, missing=dry.says)
+        yield Told(i, "dry_friction", dry.label, *GROUPS["dry_friction"], dry.column, missing=dry.says)
     for error in sensor_errors(problem, u, i):
         unit = GROUPS[error.name][0]
         one = Told(i, error.name, error.label, unit, error.step, error.column, relative=not unit)
