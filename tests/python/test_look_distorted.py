@@ -211,6 +211,8 @@ def test_what_hangs_or_falls_tells_which_way_is_up(tmp_path: Path) -> None:
         said, content = outcome(tmp_path / name, turned_over(TAKES[name](), rng))
         assert content["scene"]["gravity"] == [0.0, 0.0, 9.81] and "-z points up, as the motion shows" in said
         assert ("give --up z if it stands there" in said) == (name == "hand")
+    said, content = outcome(tmp_path / "pin", turned_over(takes.let_go(False), rng))
+    assert content["scene"]["gravity"] == [0.0, 0.0, 9.81] and "-z points up, as the motion shows" in said
     pendulum = sb.Recording.load(EXPERIMENTS / SHIPPED["pendulum"])
     said, content = outcome(tmp_path / "pendulum", turned_over(pendulum, rng))
     assert not content and "hang upward" in said and "r.positions * [1, -1, -1]" in said
