@@ -11,6 +11,7 @@ import numpy as np
 from ..arrays.timeseries import mean_position
 from ..errors import RecordingError
 from .end_load import free_end
+from .falls import falls_upward
 from .held import Hands, Held, held, parts
 from .line import snapped, tangent
 from .marked import marked_by
@@ -26,6 +27,7 @@ from .text import joined
 from .unseen import freed
 
 STANDS = 0.3  # of its length: by so much the free end of a rope is above the other one that cannot hang
+FLIES = 1.2  # of its length: so far an end goes of a rope that no clamp keeps upright
 LEAST_HELD = 30  # frames before a rope is let go, or before or after it slides through a hand
 SLIDES = 0.2  # s, that a slip takes at most
 
@@ -50,10 +52,10 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     found = holding(s, hands, order)
     if len(found.order) < 3:
         return None
-    if s.up_by == "guess" and _stands(s, found):
+    if s.up_by == "guess" and not s.static and (_stands(s, found) or (_flies(s, found) and falls_upward(s, order))):
         turned = describe([replace(take, seen=take.seen.upside_down()) for take in takes], measured)
         up = "xyz"[s.up]
-        stands = f"with {up} up, the free end would be above what holds it: give --up {up} if it stands there"
+        stands = f"with {up} up, it would stand on what holds it or fall upward: give --up {up} if it stands there"
         return None if turned is None else turned._replace(up=f"-{up}", notes=[*turned.notes, stands])
     if len(takes) == 1 and (slip := slid(s, found)) is not None:
         return _held_fast(takes[0], measured, slip)
@@ -78,6 +80,14 @@ def _stands(s: Seen, found: Held) -> bool:
     length = sum(s.apart[a, b] for a, b in pairwise(found.order))
     rise = (mean[0] - mean[-1]) @ s.gravity / np.linalg.norm(s.gravity)
     return bool((rise if free == "end" else -rise) > STANDS * length)
+
+
+def _flies(s: Seen, found: Held) -> bool:
+    """Whether a rope turns where it is held, or an end of it goes far, as that of no rod that stands in a clamp."""
+    order = list(found.order)
+    far = np.linalg.norm(np.nanmax(s.recording.positions, axis=0) - np.nanmin(s.recording.positions, axis=0), axis=1)
+    turns = bool(found.alone) or "pinned" in found.rope
+    return turns or float(far[order].max()) > FLIES * sum(s.apart[a, b] for a, b in pairwise(order))
 
 
 def _without_others(takes: Sequence[Take], measured: Measured, kept: list[str]) -> Description | None:
