@@ -211,6 +211,15 @@ def test_what_hangs_or_falls_tells_which_way_is_up(tmp_path: Path) -> None:
         said, content = outcome(tmp_path / name, turned_over(TAKES[name](), rng))
         assert content["scene"]["gravity"] == [0.0, 0.0, 9.81] and "-z points up, as the motion shows" in said
         assert ("give --up z if it stands there" in said) == (name == "hand")
+    ropes = [takes.let_go(False), takes.let_go(True), takes.rope_in_hand("one", 1.5)]
+    for k, rope in enumerate([*ropes, sb.Recording.load(EXPERIMENTS / SHIPPED["two ends"])]):
+        x, t, names = dropped(rope, rng)
+        x, t, names = turned_over(sb.Recording(x, t, tuple(names)), rng)
+        x[rng.random(x.shape[:2]) < 0.1] = np.nan
+        said, content = outcome(tmp_path / f"rope {k}", (x, t, names))
+        assert content["scene"]["gravity"] == [0.0, 0.0, 9.81] and "-z points up, as the motion shows" in said
+        (held,) = content["scene"].get("rod", []) + content["scene"].get("rope", [])
+        assert held.get("pinned") == [0] or "clamp_start" in held or held["grip"][0]["markers"] == names[:1]
     pendulum = sb.Recording.load(EXPERIMENTS / SHIPPED["pendulum"])
     said, content = outcome(tmp_path / "pendulum", turned_over(pendulum, rng))
     assert not content and "hang upward" in said and "r.positions * [1, -1, -1]" in said

@@ -61,13 +61,26 @@ def end_load(s: Seen, way: tuple[int, ...]) -> float | None:
     arc = np.concatenate([[0.0], np.cumsum([s.apart[a, b] for a, b in pairwise(way)])])
     told = []
     for k in range(1, 1 + len(way) // 2):  # the bending stiffness counts more near the free end
-        tangent = x[:, k + 1] - x[:, k - 1]
-        tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-        steps = np.diff(arc[k:])[:, None]
-        beyond = np.sum(0.5 * (pull[:, k:-1] + pull[:, k + 1 :]) * steps, axis=1)
-        of_rope, of_mass = (v - np.sum(v * tangent, axis=1, keepdims=True) * tangent for v in (beyond, pull[:, -1]))
+        of_rope, of_mass = across(x, k, beyond(pull, arc, k)), across(x, k, pull[:, -1])
         if np.mean(np.sum(of_mass**2, axis=1)) < MOVES**2:
             return None
         told.append(-float(np.sum(of_rope * of_mass) / np.sum(of_mass**2)))
     low, load, high = np.quantile(told, [0.25, 0.5, 0.75])
     return float(load) if load > COUNTS * arc[-1] and high - low < AGREE * load else None
+
+
+def beyond(pull: Array, arc: Array, k: int) -> Array:
+    """(frames, 3) m^2/s^2, the integral of a - g along the rope from its k-th marker on.
+
+    Args:
+        pull: (frames, markers, 3) m/s^2, of each marker.
+        arc: (markers,) m, along the rope.
+    """
+    return np.asarray(np.sum(0.5 * (pull[:, k:-1] + pull[:, k + 1 :]) * np.diff(arc[k:])[:, None], axis=1))
+
+
+def across(x: Array, k: int, v: Array) -> Array:
+    """(frames, 3) the part of v across the rope at the k-th of its markers (frames, markers, 3)."""
+    tangent = x[:, k + 1] - x[:, k - 1]
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    return np.asarray(v - np.sum(v * tangent, axis=1, keepdims=True) * tangent)

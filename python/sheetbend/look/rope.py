@@ -9,7 +9,9 @@ from itertools import pairwise
 import numpy as np
 
 from ..arrays.timeseries import mean_position
+from ..errors import RecordingError
 from .end_load import free_end
+from .falls import falls_upward
 from .held import Hands, Held, held, parts
 from .line import snapped, tangent
 from .marked import marked_by
@@ -19,12 +21,15 @@ from .rope_model import model_of
 from .rope_sections import lines_of
 from .rope_words import notes_of, unknown_of
 from .seen import Seen
+from .slid import Slip, slid
 from .take import Description, Measured, Take
 from .text import joined
 from .unseen import freed
 
-STANDS = 0.5  # of its length: by so much the free end of a rope is above the other one that cannot hang
-LEAST_HELD = 30  # frames before a rope is let go
+STANDS = 0.3  # of its length: by so much the free end of a rope is above the other one that cannot hang
+FLIES = 1.2  # of its length: so far an end goes of a rope that no clamp keeps upright
+LEAST_HELD = 30  # frames before a rope is let go, or before or after it slides through a hand
+SLIDES = 0.2  # s, that a slip takes at most
 
 
 def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
@@ -47,11 +52,13 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     found = holding(s, hands, order)
     if len(found.order) < 3:
         return None
-    if s.up_by == "guess" and _stands(s, found):
+    if s.up_by == "guess" and not s.static and (_stands(s, found) or (_flies(s, found) and falls_upward(s, order))):
         turned = describe([replace(take, seen=take.seen.upside_down()) for take in takes], measured)
         up = "xyz"[s.up]
-        stands = f"with {up} up, the free end would be above what holds it: give --up {up} if it stands there"
+        stands = f"with {up} up, it would stand on what holds it or fall upward: give --up {up} if it stands there"
         return None if turned is None else turned._replace(up=f"-{up}", notes=[*turned.notes, stands])
+    if len(takes) == 1 and (slip := slid(s, found)) is not None:
+        return _held_fast(takes[0], measured, slip)
     pushed = None
     if s.rest and not s.static and not found.grips and len(takes) == 1:
         free = freed(takes[0], found.order, "rope")
@@ -65,14 +72,22 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
 
 
 def _stands(s: Seen, found: Held) -> bool:
-    """Whether the free end of a rope that something moves is above the other one: a rope hangs."""
+    """Whether the free end of a rope that something moves, or that turns on a pin, is above the other one: it hangs."""
     free = free_end(found)
-    if free is None or not found.grips:
+    if free is None or not (found.grips or "pinned" in found.rope):
         return False
     mean = mean_position(s.recording.positions)[list(found.order)]
     length = sum(s.apart[a, b] for a, b in pairwise(found.order))
     rise = (mean[0] - mean[-1]) @ s.gravity / np.linalg.norm(s.gravity)
     return bool((rise if free == "end" else -rise) > STANDS * length)
+
+
+def _flies(s: Seen, found: Held) -> bool:
+    """Whether a rope turns where it is held, or an end of it goes far, as that of no rod that stands in a clamp."""
+    order = list(found.order)
+    far = np.linalg.norm(np.nanmax(s.recording.positions, axis=0) - np.nanmin(s.recording.positions, axis=0), axis=1)
+    turns = bool(found.alone) or "pinned" in found.rope
+    return turns or float(far[order].max()) > FLIES * sum(s.apart[a, b] for a, b in pairwise(order))
 
 
 def _without_others(takes: Sequence[Take], measured: Measured, kept: list[str]) -> Description | None:
@@ -100,6 +115,24 @@ def _while_held(take: Take, measured: Measured, let_go: float) -> Description | 
         found.notes.append(
             f"it falls freely from {let_go:.3g} s on: what holds it lets go, and only the time before is used"
         )
+    return found
+
+
+def _held_fast(take: Take, measured: Measured, slip: Slip) -> Description | None:
+    """The rope before it slides out of a hand, or after it where that is more than twice as long: after it, a motion
+    does not begin at rest, and markers tell poorly how it begins."""
+    r, what = (
+        take.seen.recording,
+        f"slides out of the hand ({slip.hand}) by {1e3 * slip.by:.2g} mm at {slip.time:.3g} s",
+    )
+    first, last = float(r.times[0]), float(r.times[-1])
+    before = 2.0 * (slip.time - first) > last - slip.time
+    part = r.piece(first, slip.time) if before else r.piece(min(slip.time + SLIDES, last), last)
+    if len(part.times) < LEAST_HELD:
+        raise RecordingError("markers", f"are on a rope that {what}", slip.hand, "grip it firmly, and record it again")
+    found = describe([replace(take, seen=take.seen.of(part))], measured)
+    if found is not None:
+        found.notes.append(f"the rope {what}: only the time {'before' if before else 'after'} that is used")
     return found
 
 

@@ -1,0 +1,43 @@
+"""Whether a rope that moves falls upward, with the way up that is taken: then it is the other one.
+
+A flexible rope carries no force across itself. So what is beyond a point of it balances across its direction there, as
+in `end_load`: without a mass at the end, the integral of a - g has no part across it. With g upside down it has one.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from ..arrays.smoothing import smoothed
+from ..arrays.timeseries import interpolate
+from .end_load import FEWEST, FRAMES, across, beyond
+from .seen import REST, Seen
+
+Array = np.ndarray
+CLEARLY = 0.5  # of what is left with the way up that is taken: less is left with the other one
+
+
+def falls_upward(s: Seen, order: tuple[int, ...]) -> bool:
+    """Whether gravity the other way explains much better how a rope moves, whichever end is free."""
+    t = s.recording.times
+    x = interpolate(t, s.recording.positions[:, list(order)], t, "cubic", np.inf)
+    whole = np.isfinite(x).all(axis=(1, 2))  # all but frames at both ends
+    t, x = t[whole], x[whole]
+    moving = t > s.recording.times[0] + s.rest
+    if len(order) < FEWEST or moving.sum() < FRAMES:
+        return False
+    x, speed = smoothed(t, x, REST / 2)
+    _, acceleration = smoothed(t, speed, REST / 2)
+    arc = np.concatenate([[0.0], np.cumsum([s.apart[a, b] for a, b in pairwise(order)])])
+    ways = [(x[moving], acceleration[moving], arc), (x[moving, ::-1], acceleration[moving, ::-1], arc[-1] - arc[::-1])]
+    down, up = (min(_left(*way, sign * s.gravity) for way in ways) for sign in (1.0, -1.0))
+    return bool(up < CLEARLY * down)
+
+
+def _left(x: Array, acceleration: Array, arc: Array, gravity: Array) -> float:
+    """m/s^2, what does not balance across the rope in its outer half, root mean square: the median over markers."""
+    parts = range(1, 1 + len(arc) // 2)
+    each = [across(x, k, beyond(acceleration - gravity, arc, k)) / (arc[-1] - arc[k]) for k in parts]
+    return float(np.median([np.sqrt(np.mean(np.sum(one**2, axis=1))) for one in each]))
