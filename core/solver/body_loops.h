@@ -11,7 +11,8 @@ namespace sheetbend {
 
 inline constexpr double pivot_of_loop = 1e-6;  // 1e-3 rad
 
-// Whether these members close a loop of bodies, or of bodies and the ground.
+// Whether these members close a loop of bodies, or of bodies and the ground. Two bodies are joined by a group that has two or three rows between points of
+// both, whatever its kind; by more rows they are joined twice. A single row, as of a spring or a stop, joins nothing.
 bool closes_loop(const Scene& scene, const std::vector<Member>& members);
 
 }  // namespace sheetbend

@@ -4,54 +4,11 @@
 // have a compliance beyond all others in all of its iterations: tangents and reverse need nothing of their own.
 #pragma once
 
-#include "core/scalar/pivot.h"
 #include "core/solver/project_block.h"
 
 namespace sheetbend {
 
 inline constexpr double beyond_all = 1e150;  // D of such a row, whose square is still a number
-
-// Of one scene at least.
-template <class T>
-bool is_rigid(const T& D) {
-  if constexpr (std::is_same_v<T, Pack>) {
-    for (int lane = 0; lane < Pack::lanes; ++lane)
-      if (D[lane] == 0.0) return true;
-    return false;
-  } else {
-    return value_of(D) == 0.0;
-  }
-}
-
-// The inverse pivots of the rigid rows of a condensed block in J W J^T + D, as of any constraints' matrix; one for all other rows.
-template <class T>
-std::vector<T> inverse_pivots_of_rigid(const BlockNumbers<T>& block, double least) {
-  std::vector<int> place(block.size, -1), rigid;
-  for (int row = 0; row < block.size; ++row)
-    if (is_rigid(block.diagonal[row])) {
-      place[row] = static_cast<int>(rigid.size());
-      rigid.push_back(row);
-    }
-  const std::size_t n = rigid.size();
-  std::vector<T> L(n * n, T(0.0)), inverse(n), pivots(block.size, T(1.0));
-  for (std::size_t v = 0; v < n; ++v) L[v * n + v] = block.diagonal[rigid[v]];
-  for (int p = 0; p < block.movable; ++p)
-    for (int i = block.window[p]; i < block.window[p + 1]; ++i)
-      for (int k = block.window[p]; k < block.window[p + 1]; ++k) {
-        const int v = place[block.rows[i]], w = place[block.rows[k]];
-        if (w >= 0 && w <= v)
-          L[v * n + w] += block.inverse_mass(p) * dot(Vec3<T>(block.gradient(i)), Vec3<T>(block.gradient(k)));
-      }
-  // Columns stay as they are before the division by their pivot.
-  for (std::size_t v = 0; v < n; ++v) {
-    const T diagonal = L[v * n + v];
-    for (std::size_t w = 0; w <= v; ++w)
-      for (std::size_t k = 0; k < w; ++k) L[v * n + w] -= L[v * n + k] * inverse[k] * L[w * n + k];
-    inverse[v] = inverse_pivot(L[v * n + v], diagonal, least);
-    pivots[rigid[v]] = inverse[v];
-  }
-  return pivots;
-}
 
 // x: the state that the substep starts from. Comes after begin_block().
 template <class T>
@@ -63,17 +20,16 @@ void let_loop_rows_give_way(const SubstepState<T>& s, const DirectBlock& block,
   const auto& kernels = forward_kernels<Plain<T>>(table);
   kernels.evaluate(arrays_of(block, runs_of(s, block, state), state, 0));
   evaluate_volumes(s.scene, s.inputs, block, state, 0);
-  const auto give_way = [&](const std::vector<Plain<T>>& inverse) {
-    for (int row = 0; row < block.size(); ++row) {
-      const T D = state.diagonal[row];
-      state.diagonal[row] = select(inverse[row] > Plain<T>(0.0), D, T(beyond_all));
-    }
-  };
   if (block.condensation) {
-    give_way(inverse_pivots_of_rigid(numbers_of_block(block, state, 0), block.loop_pivot));
+    const auto& left_out = state.independent.left_out(numbers_of_block(block, state, 0), block.loop_pivot);
+    for (int row = 0; row < block.size(); ++row)
+      state.diagonal[row] = chosen(left_out[row], T(beyond_all), T(state.diagonal[row]));
   } else {
     factor_sparse(block, kernels, state, 0);
-    give_way(state.at(0).factor.inverse);
+    for (int row = 0; row < block.size(); ++row) {
+      const T D = state.diagonal[row];
+      state.diagonal[row] = select(state.at(0).factor.inverse[row] > Plain<T>(0.0), D, T(beyond_all));
+    }
   }
   load_coordinates(s.scene, block, s.q, state.x[0]);
 }

@@ -10,6 +10,7 @@
 #include "core/solver/block_tangents.h"
 #include "core/solver/block_volume.h"
 #include "core/solver/implicit_block.h"
+#include "core/solver/independent_rows.h"
 #include "core/solver/placed.h"
 #include "core/solver/plan.h"
 #include "core/solver/states.h"
@@ -59,6 +60,7 @@ struct BlockState {
   std::vector<BlockContacts<Single<T>>> contacts;  // likewise
   std::vector<PairFriction<Single<T>>> friction;   // likewise, of pairs
   std::vector<Vec3<T>> frame_pushes;               // per frame of the block, on the way back: W^-1 (x - x~)
+  IndependentRows independent;                     // of condensed blocks that close a loop of bodies
   double eta = 0.0;                                // of `values` and `diagonal`; 0 where they are not filled yet
 
   void resize(const Scene& scene, const DirectBlock& block, int kept_iterations);

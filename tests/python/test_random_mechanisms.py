@@ -30,7 +30,7 @@ def test_a_door_on_two_hinges_whose_bodies_turn_apart_in_a_substep(seed: int) ->
     assert max(found.values()) < BOUND, parts
 
 
-@pytest.mark.parametrize("seed", [642, 1323, 1331, 477, 596, 652, 664])
+@pytest.mark.parametrize("seed", [642, 1323, 1331, 652])
 def test_gradients_are_exact_where_forces_were_1e4_times_too_large(seed: int) -> None:
     found, parts = differs(seed)
     assert "two hinges" in parts
@@ -47,6 +47,23 @@ def test_a_door_in_drag_has_the_forces_between_its_hinges_that_implicit_finds(me
     assert max(np.abs(f).max() for name, f in motion.forces.items() if name.startswith("j1")) < 2.0  # N
     found, parts = differs(189, replace(solver, method=method))
     assert max(found.values()) < BOUND, parts
+
+
+@pytest.mark.parametrize("seed", [477, 572, 596, 664])
+def test_newton_holds_a_loop_with_the_forces_of_direct(seed: int) -> None:
+    """Of rows that say the same, `newton` kept some that hardly differ: seed 572 had 15 kN where `direct` has 56 N, and
+    its gradient was off by 1e-5."""
+    scene, solver, _ = scene_of(seed)
+    assert solver.method == "newton"
+    largest = []
+    for method in ("newton", "direct"):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", sb.RedundantConstraintsWarning)
+            motion = sb.simulate(scene, [0.0, 0.002, 0.004], replace(solver, method=method))
+        forces = [f for name, f in motion.forces.items() if name.startswith(("j", "loop"))]
+        largest.append(max(np.abs(f).max() for f in forces))
+    assert largest[0] < 1.5 * largest[1]
+    assert max(differs(seed)[0].values()) < 1e-9
 
 
 def test_implicit_refuses_the_derivative_of_a_door_on_two_hinges() -> None:
