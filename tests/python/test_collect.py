@@ -5,13 +5,20 @@ from __future__ import annotations
 import csv
 import json
 import math
+from concurrent.futures import Executor, Future
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import sheetbend as sb
 from commands import last_line, run
+from sheetbend.cli.ensemble import fit_all
+from sheetbend.cli.fit import _single
+from sheetbend.cli.outcome import Code
+from sheetbend.cli.screen import Screen
 from sheetbend.errors import InputError
+from sheetbend.minimum.journal import Journal
 from sheetbend.report.collected import Collected
 from sheetbend.report.fit_result import FitResult
 from sheetbend.result.estimate import Estimate
@@ -200,7 +207,7 @@ def test_one_command_fits_all_and_does_nothing_twice(ropes: Path) -> None:
 
 def test_a_specimen_that_lacks_a_marker_is_named(ropes: Path, tmp_path: Path) -> None:
     for name in "abcd":
-        (tmp_path / f"{name}.toml").write_text((ropes / f"{name}.toml").read_text(), encoding="utf-8")
+        (tmp_path / f"{name}.toml").write_text(ROPE.format(name=name), encoding="utf-8")
         r = sb.Recording.load(ropes / f"{name}.npz")
         x, markers = r.positions.copy(), r.markers
         if name == "b":  # the last marker fell off before the recording, so the others move along the rope
@@ -217,6 +224,40 @@ def test_a_specimen_that_lacks_a_marker_is_named(ropes: Path, tmp_path: Path) ->
     rows = csv.DictReader((tmp_path / "all" / "fits.csv").read_text().splitlines())
     assert {row["specimen"]: row["markers"] for row in rows} == {"a": "", "d": "", **told["markers"]}
     assert "markers: b: lacks m6; c: m3 is seen" in (tmp_path / "all" / "population.txt").read_text()
+
+
+class Interrupted(Executor):
+    """The first fit is done; Ctrl-C comes while the second one is waited for."""
+
+    def __init__(self) -> None:
+        self.done = 0
+
+    def submit(self, fn: Any, /, *args: Any, **options: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        if self.done == 0:
+            future.set_result(fn(*args, **options))
+        else:
+            future.set_exception(KeyboardInterrupt())
+        self.done += 1
+        return future
+
+
+def test_ctrl_c_while_workers_fit_keeps_what_is_done(ropes: Path, tmp_path: Path) -> None:
+    console = Screen()
+    with console.capture() as told:
+        found = fit_all(console, str(ropes / "[ab].toml"), tmp_path, False, _single, Interrupted())
+    assert found.code is Code.INTERRUPTED and found.data["fits"]["b"] == 130
+    assert "interrupted: the same command goes on from here" in told.get()
+    assert (tmp_path / "a" / "fit.json").is_file() and not (tmp_path / "b").exists()
+
+
+def test_an_unfinished_run_of_another_configuration_begins_anew(ropes: Path, tmp_path: Path) -> None:
+    """Its journal is of no use, and nobody gave the `--resume` that the error asks to leave out."""
+    (tmp_path / "a").mkdir()
+    Journal(tmp_path / "a" / "journal.sqlite", {"[fit]": "another"}).close()
+    told = run("fit", ropes / "[a]*.toml", "--output", tmp_path)
+    assert told.exit_code in (0, 4) and "is of another fit; different are" in " ".join(told.stdout.split())
+    assert (tmp_path / "a" / "fit.json").is_file() and not list((tmp_path / "a").glob("journal*"))
 
 
 def test_several_fits_refuse_what_is_for_one(ropes: Path) -> None:

@@ -22,7 +22,7 @@ from .outcome import Code, Outcome, code_of
 from .screen import Screen
 
 RESULT, ERROR = "fit.json", "error.txt"
-WORST_FIRST = (Code.TERMINATED, Code.INTERRUPTED, Code.BAD_INPUT, Code.NOT_CONVERGED, Code.NOT_IDENTIFIABLE)
+WORST_FIRST = (Code.INTERRUPTED, Code.BAD_INPUT, Code.NOT_CONVERGED, Code.NOT_IDENTIFIABLE)
 Single = Callable[[Console, Path, Path, bool], Outcome]
 
 
@@ -59,12 +59,17 @@ def fit_all(
                 with naming_losses():
                     text, codes[folder.name] = futures[i].result()
                 console.print(text, soft_wrap=True, end="")
-            if codes[folder.name] in (Code.INTERRUPTED, Code.TERMINATED):
+            if codes[folder.name] is Code.INTERRUPTED:
                 break
+    except KeyboardInterrupt:  # while workers fit; what they have begun stays in journals
+        pass
     finally:
         for future in futures:
             future.cancel()
-    failed = [name for name, code in codes.items() if code is not Code.DONE]
+    codes |= {folder.name: Code.INTERRUPTED for _, folder in left if folder.name not in codes}
+    if Code.INTERRUPTED in codes.values():
+        console.print("\ninterrupted: the same command goes on from here", soft_wrap=True)
+    failed = [name for name, code in codes.items() if code not in (Code.DONE, Code.INTERRUPTED)]
     if failed:
         console.print(f"\nnot done, not converged or not identifiable: {', '.join(failed)}", soft_wrap=True)
     console.print(f"\n`sheetbend collect {output}` puts them into one table", soft_wrap=True)

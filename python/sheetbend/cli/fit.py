@@ -35,6 +35,7 @@ from .figures import figure_files, figures_form, write_figures
 from .folders import alone, made, made_again
 from .gripped import fit_ropes, load_ropes, rope_files
 from .journals import NAME, journal_in, made_from
+from .journals import OPTION as GOING_ON
 from .movies import OPTION, MoviePath, check_before, write_movies
 from .outcome import Code, Json, Outcome, code_of, run
 from .pages import PAGE, page_possible, write_fit_page
@@ -118,8 +119,15 @@ def fit(
 
 
 def _single(console: Console, config: Path, output: Path, strict: bool) -> Outcome:
-    """One fit of several; it goes on with what a killed one left."""
-    return _fit(console, config, output, None, (output / NAME).exists(), None, strict)
+    """One fit of several. It goes on with what a killed one left, unless that was made from something else."""
+    if (output / NAME).exists():
+        try:
+            return _fit(console, config, output, None, True, None, strict)
+        except ConfigError as error:
+            if error.field != GOING_ON:
+                raise
+            console.print(f"{output}: {error.problem} (got {error.got!r})", soft_wrap=True)
+    return _fit(console, config, output, None, False, None, strict)
 
 
 def _fit(

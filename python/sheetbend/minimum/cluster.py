@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
+from typing import TYPE_CHECKING
 
 from ..errors import ConfigError
 from ..optional import require
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
 
 RETRIES = 3  # of a task that failed, such as by memory
 TIMEOUT = 30.0  # s, to reach a scheduler, or until it has written its file
@@ -65,7 +70,10 @@ def dask(address: str) -> Iterator[Executor]:
 
 @contextmanager
 def processes(count: int) -> Iterator[Executor | None]:
-    """`count` processes of this machine, each with one thread of linear algebra; None for a count of one or none."""
+    """`count` processes of this machine, each with one thread of linear algebra; None for a count of one or none.
+
+    They end with the context or with this process, however that ends, also in the middle of their work.
+    """
     if count < 2:
         yield None
         return
@@ -76,11 +84,15 @@ def processes(count: int) -> Iterator[Executor | None]:
         for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
             undone.callback(_set, name, os.environ.get(name))
             os.environ[name] = "1"
-        pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), _ignore_interrupts)
+        spawning = multiprocessing.get_context("spawn")
+        workers_end, own_end = spawning.Pipe(duplex=False)  # this process alone holds its own end
+        pool = ProcessPoolExecutor(count, spawning, _work_for, (workers_end,))
         try:
             yield pool
         finally:
-            pool.shutdown(cancel_futures=True)
+            with _undisturbed():
+                own_end.close()
+                pool.shutdown(cancel_futures=True)
 
 
 def _set(name: str, value: str | None) -> None:
@@ -90,6 +102,27 @@ def _set(name: str, value: str | None) -> None:
         os.environ[name] = value
 
 
-def _ignore_interrupts() -> None:
-    """Ctrl-C reaches all processes; this one's client decides what comes of it."""
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Ignores Ctrl-C and SIGTERM; a pool that is interrupted while it shuts down never ends."""
+    if threading.current_thread() is not threading.main_thread():  # which no signal interrupts
+        yield
+        return
+    before = {number: signal.signal(number, signal.SIG_IGN) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _work_for(client: Connection) -> None:
+    """Begins a worker. Ctrl-C reaches all processes, and the client decides what comes of it; when the client's end of
+    the pipe closes, the worker ends at once."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def end() -> None:
+        client.poll(None)
+        os._exit(1)
+
+    threading.Thread(target=end, daemon=True).start()

@@ -68,23 +68,41 @@ class LiftedWindow:
         """
         Args:
             recording: of which the window is a part.
-            edges: (windows + 1,) s, see `shooting.borders`.
+            edges: (windows + 1,) s, see `cut.borders`.
             quantities: values of the experiment's quantities, in their order.
             free: the fit's parameters, as the compiled problem takes them; their slots count the quantities.
         """
         own = shot(e)
         assert own is not None and own.behind is not None and own.pace is not None
-        self._behind, self._pace, self._number = own.behind, own.pace, number
-        part, particles = piece(recording, edges, number, own.behind), free_particles(e.scene)
-        core = e.core(part)
-        last = number == len(edges) - 2
-        wanted = [float(edges[k]) - e.t0 for k in ([number] if number else []) + ([] if last else [number + 1])]
-        instants = np.array([t + j * own.behind for t in wanted for j in (1, 2)])
-        observed = core["observed"]
+        self._behind, self._pace = own.behind, own.pace
+        core = e.core(piece(recording, edges, number, own.behind))
+        core["t0"] = float(edges[number]) - e.t0
+        if number:
+            core |= {"start": "given", "name": f"{e.name} from {edges[number]:.6g} s"}
+        watched = [number] * (number > 0) + [number + 1] * (number < len(edges) - 2)  # borders
+        shown = self._watch(core, e, [float(edges[k]) - e.t0 + j * own.behind for k in watched for j in (1, 2)])
+        self._start = shown[:2] if number else []
+        self._end = shown[-2:] if number < len(edges) - 2 else []
+        names = list(quantities)
+        lifted = [names.index(name) for name in start_quantities(e.scene)] if number else []
+        self._columns, border = _without(free, lifted)
+        state = [{"name": names[s], "log": False, "slots": [s], "factors": [1.0], "prior": None} for s in lifted]
+        self.states, self.rows, self._parameters = len(lifted), len(self._data), len(free)
+        self._core = _core.Problem(
+            experiments=[core],
+            theta=list(quantities.values()),
+            slots=[range(len(names))],
+            free=[*border, *state],
+            threads=1,
+        )
+
+    def _watch(self, core: dict[str, Any], e: Experiment, instants: Sequence[float]) -> list[Numbers]:
+        """Lets the compiled experiment show the free particles at some instants (s), as markers whose residuals times
+        `FAR` are their places; returns the rows of each instant."""
+        observed, particles = core["observed"], free_particles(e.scene)
         frames, markers = np.asarray(observed["times"]), len(observed["markers"])
         times = np.union1d(frames, instants)
-        self._frames = np.searchsorted(times, frames)
-        places = np.searchsorted(times, instants)
+        self._frames, places = np.searchsorted(times, frames), np.searchsorted(times, instants)
         measured = np.full((len(times), markers + len(particles), 3), np.nan)
         measured[self._frames, :markers] = observed["measured"]
         measured[places, markers:] = 0.0
@@ -99,30 +117,11 @@ class LiftedWindow:
             "markers": [*observed["markers"], *(on_particle(p).core(e.scene) for p in particles)],
         }
         core["map"]["base"] = np.append(core["map"]["base"], np.zeros(3 * len(particles)))
-        core["t0"] = float(edges[number]) - e.t0
-        core["start"] = core["start"] if number == 0 else "given"
-        if number:
-            core["name"] = f"{e.name} from {edges[number]:.6g} s"
         frame, marker = np.nonzero(np.isfinite(measured[..., 0]))
         counts = np.array([a in e.axes for a in "xyz"])
         self._data = np.flatnonzero(np.ravel((marker < markers)[:, None] & counts))
-        shown = [np.flatnonzero(np.repeat((marker >= markers) & (frame == at), 3)) for at in places]
-        self._start = shown[:2] if number else []
-        self._end = [] if last else shown[-2:]
-        names = list(quantities)
-        lifted = [names.index(name) for name in start_quantities(e.scene)] if number else []
-        self._columns, mine = [], []
-        for column, p in enumerate(free):
-            tied = [(s, f) for s, f in zip(p["slots"], p["factors"], strict=True) if s not in lifted]
-            if tied:
-                self._columns.append(column)
-                mine.append({**p, "slots": [s for s, _ in tied], "factors": [f for _, f in tied], "prior": None})
-        mine += [{"name": names[s], "log": False, "slots": [s], "factors": [1.0], "prior": None} for s in lifted]
-        self.states, self.rows, self._parameters = len(lifted), len(self._data), len(free)
         self._markers, self._particles = markers, len(particles)
-        self._core = _core.Problem(
-            experiments=[core], theta=list(quantities.values()), slots=[range(len(names))], free=mine, threads=1
-        )
+        return [np.flatnonzero(np.repeat((marker >= markers) & (frame == at), 3)) for at in places]
 
     @property
     def failure(self) -> str:
@@ -177,3 +176,15 @@ class LiftedWindow:
         """
         every = self._core.simulate(0, np.append(u[self._columns], state))
         return every.reshape(-1, self._markers + self._particles, 3)[self._frames, : self._markers]
+
+
+def _without(free: Sequence[Mapping[str, Any]], lifted: Sequence[int]) -> tuple[list[int], list[dict[str, Any]]]:
+    """Which parameters set any quantity (by its slot) that is not lifted, and these without the lifted ones and their
+    priors."""
+    columns, kept = [], []
+    for column, p in enumerate(free):
+        tied = [(s, f) for s, f in zip(p["slots"], p["factors"], strict=True) if s not in lifted]
+        if tied:
+            columns.append(column)
+            kept.append({**p, "slots": [s for s, _ in tied], "factors": [f for _, f in tied], "prior": None})
+    return columns, kept
