@@ -20,7 +20,7 @@ from sheetbend.optional import MissingExtraError, require
 from sheetbend.quantities.wording import short
 from sheetbend.report.fit_result import FitResult
 from sheetbend.report.report import figures, plain, rich_report
-from sheetbend.report.report_premises import _moved
+from sheetbend.report.report_premises import _shift_in_words
 from sheetbend.result.estimate import Correlation, Estimate, Given, Premise
 from sheetbend.result.motions import RecordingFit
 from sheetbend.result.result import Misfit, Start
@@ -319,8 +319,8 @@ def test_a_sigma_in_millimeters_is_named(result: FitResult) -> None:
 def test_large_percentages_have_no_exponent() -> None:
     e = estimate("drag", 0.03, 0.02, "weak", "")
     moved = Premise(name="table about x", value=None, unit="", off_by=1.0, words="1 degree", moved={"drag": -0.096})
-    assert _moved(moved, e) == "-320 %"
-    assert _moved(dataclasses.replace(moved, moved={"drag": 0.0031}), e) == "+10 %"
+    assert _shift_in_words(moved, e) == "-320 %"
+    assert _shift_in_words(dataclasses.replace(moved, moved={"drag": 0.0031}), e) == "+10 %"
 
 
 def test_panels_over_one_time_begin_at_one_place() -> None:

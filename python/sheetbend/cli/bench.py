@@ -16,9 +16,9 @@ def bench(
     json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
 ) -> None:
     """Moved to the sources: experiments/bench/measure.py."""
-    run(lambda console: _moved(console, workload or []), json)
+    run(lambda console: _refuse(console, workload or []), json)
 
 
-def _moved(console: Console, given: list[str]) -> Outcome:
+def _refuse(console: Console, given: list[str]) -> Outcome:
     fix = f"in a checkout of the sources run: python experiments/bench/measure.py {' '.join(given) or 'WORKLOAD'}"
     raise InputError("sheetbend bench", "is no longer part of the installed package", " ".join(given), fix)

@@ -31,7 +31,7 @@ def compare_dict(fits: Sequence[Written], pairs: Mapping[str, Paired | None]) ->
             other.name: {
                 "paired": None if (pair := pairs[other.name]) is None else asdict(pair),
                 "settings": {k: [a, b] for k, a, b in _differences(fits[0], other)},
-                "apart": _apart(fits[0], other),
+                "apart": _disagreeing(fits[0], other),
             }
             for other in fits[1:]
         },
@@ -74,7 +74,7 @@ def _numbers(fits: Sequence[Written]) -> Section:
     for name in names:
         own = [next((e for e in fit.result.estimates if e.name == name), None) for fit in fits]
         rows.append((name, *(_cell(e) for e in own)))
-    notes = [(fit.name, "; ".join(words)) for fit in fits[1:] if (words := _apart(fits[0], fit))]
+    notes = [(fit.name, "; ".join(words)) for fit in fits[1:] if (words := _disagreeing(fits[0], fit))]
     verdicts = [_verdicts(fits[0], fit) for fit in fits[1:]]
     notes += [(fit.name, words) for fit, words in zip(fits[1:], verdicts, strict=True) if words]
     return Section("Numbers and verdicts", ("parameter", *(fit.name for fit in fits)), tuple(rows), tuple(notes))
@@ -87,7 +87,7 @@ def _cell(e: Estimate | None) -> str:
     return f"{value}{' +/- ' + half if half else ''} {e.unit}".rstrip() + f" ({e.verdict})"
 
 
-def _apart(first: Written, other: Written) -> list[str]:
+def _disagreeing(first: Written, other: Written) -> list[str]:
     """Parameters of both whose values lie farther apart than their intervals have it."""
     found = []
     for e in other.result.estimates:

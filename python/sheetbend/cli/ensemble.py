@@ -51,10 +51,10 @@ def fit_all(
     futures: list[Future[tuple[str, Code]]] = []
     try:
         if executor is not None:
-            futures = [executor.submit(_apart, single, path, folder, strict) for path, folder in left]
+            futures = [executor.submit(_run_in_worker, single, path, folder, strict) for path, folder in left]
         for i, (path, folder) in enumerate(left):
             if executor is None:
-                codes[folder.name] = _told(single, console, path, folder, strict)
+                codes[folder.name] = _code_of(single, console, path, folder, strict)
             else:
                 with naming_losses():
                     text, codes[folder.name] = futures[i].result()
@@ -121,7 +121,7 @@ def _made(path: Path, folder: Path) -> FitResult | None:
     return None
 
 
-def _told(single: Single, console: Console, path: Path, folder: Path, strict: bool) -> Code:
+def _code_of(single: Single, console: Console, path: Path, folder: Path, strict: bool) -> Code:
     """The code of one fit; an error of the package is told."""
     try:
         with noting():
@@ -141,9 +141,9 @@ def _failed(console: Console, folder: Path, error: SheetbendError, ahead: str = 
     return Code.BAD_INPUT if isinstance(error, ConfigError) else Code.NOT_CONVERGED
 
 
-def _apart(single: Single, path: Path, folder: Path, strict: bool) -> tuple[str, Code]:
+def _run_in_worker(single: Single, path: Path, folder: Path, strict: bool) -> tuple[str, Code]:
     """Run one fit in a worker; return what it printed and its exit code."""
     console = Screen()
     console.file = io.StringIO()
-    code = _told(single, console, path, folder, strict)
+    code = _code_of(single, console, path, folder, strict)
     return console.file.getvalue(), code

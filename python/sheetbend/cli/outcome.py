@@ -73,11 +73,11 @@ def run(command: Callable[[Console], Outcome], as_json: bool) -> None:
     if outcome.code is Code.INTERRUPTED and stopping.terminated:
         outcome = replace(outcome, code=Code.TERMINATED)
     if as_json:
-        outcome = _told(outcome)
+        outcome = _print_json(outcome)
     raise typer.Exit(int(outcome.code))
 
 
-def _told(outcome: Outcome) -> Outcome:
+def _print_json(outcome: Outcome) -> Outcome:
     """Print an outcome as JSON and return it; if stdout is full, the outcome is that of bad input."""
     try:
         print(json.dumps(strict({**outcome.data, "exit_code": int(outcome.code)}), allow_nan=False), flush=True)

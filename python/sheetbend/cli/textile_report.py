@@ -72,7 +72,7 @@ def report(curves: Sequence[Curve], fit: FabricFit | None, cycle: int) -> str:
     means = ", ".join(f"{n} {short(float(values[n].mean()), 4)} {units[n].unit}".rstrip() for n in names)
     notes = [("in SI units", means)]
     if fit is None:
-        notes.append(("left out of an elastic fabric", _lost(curves, cycle)))
+        notes.append(("left out of an elastic fabric", _loss_in_words(curves, cycle)))
     lines = plain_section(Section("Curves", ("specimen", *headers), tuple(rows), tuple(notes)))
     return "\n".join(lines) + ("\n" if fit is None else f"\n\n{fit}\n")
 
@@ -114,7 +114,7 @@ def _scatter(values: Array) -> float:
     return float(values.std(ddof=1)) if len(values) > 1 else np.nan
 
 
-def _lost(curves: Sequence[Curve], cycle: int) -> str:
+def _loss_in_words(curves: Sequence[Curve], cycle: int) -> str:
     lost = [part for part in (kes_numbers(c, cycle)[1] for c in curves) if part is not None]
     if not lost:
         return "the curves have no way back, so what a loop would lose is not known"

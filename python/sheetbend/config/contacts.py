@@ -160,7 +160,7 @@ def _colliders(section: SceneSection, tools: Mapping[str, Tool], folder: Path) -
                 given["mesh"] = _mesh(f"{path}.file", folder / given.pop("file"), given.pop("unit", "m"))
             standing = SHAPES[described.shape](name=described.name, **given)
         with located(path, f"{described.name}.moving"):
-            found[described.name] = _moved(path, described, standing, tools)
+            found[described.name] = _set_in_motion(path, described, standing, tools)
     return found
 
 
@@ -173,7 +173,7 @@ def _mesh(path: str, file: Path, unit: str) -> TriangleMesh:
         return read_mesh(file, material="unfold", unit=unit, merge=True)
 
 
-def _moved(path: str, described: ColliderSection, standing: Collider, tools: Mapping[str, Tool]) -> Collider:
+def _set_in_motion(path: str, described: ColliderSection, standing: Collider, tools: Mapping[str, Tool]) -> Collider:
     if described.tool is not None:
         tool = tool_named(f"{path}.tool", described.tool, tools)
         return tool.carry(standing)

@@ -54,9 +54,9 @@ def cloth_sizes(problem: FitProblem, u: Array, i: int) -> list[Told]:
             }
             of, start = ({key: inputs} if inputs else {} for key, inputs in each.items())
             added |= of | start
-            directions += _told(name, label, f" along the {along}", [*of], [*start])
+            directions += _directions_of_size(name, label, f" along the {along}", [*of], [*start])
             made, starts = [*made, *of], [*starts, *start]
-        directions += _told(name, f"size of {name}", "", made, starts)
+        directions += _directions_of_size(name, f"size of {name}", "", made, starts)
         if turned := _changed(e.scene, cloth, values, _turned):
             label = f"grain of {name}"
             added[label] = turned
@@ -74,7 +74,7 @@ def cloth_sizes(problem: FitProblem, u: Array, i: int) -> list[Told]:
     ]
 
 
-def _told(
+def _directions_of_size(
     name: str, label: str, along: str, made: list[str], starts: list[str]
 ) -> Iterator[tuple[str, Callable[[float], str], list[str]]]:
     """Label, words and inputs of a size, in a start as it was told, and with that."""

@@ -60,7 +60,7 @@ def held_directions(scene: Scene, inputs: Array) -> list[Turn]:
     Args:
         inputs: of the scene.
     """
-    every = [*_ends(scene), *_bodies(scene)]
+    every = [*_held_ends(scene), *_bodies(scene)]
     if len(every) == 1 and not scene.boundary.driven:
         own = {n for vector in every[0].vectors for n in vector}
         if scene.pinned <= own:
@@ -68,7 +68,7 @@ def held_directions(scene: Scene, inputs: Array) -> list[Turn]:
     return [turn for held in every for turn in _turns(scene, inputs, held)]
 
 
-def _ends(scene: Scene) -> Iterator[_Held]:
+def _held_ends(scene: Scene) -> Iterator[_Held]:
     held = set(scene.held)
     for rope in scene.ropes.values():
         for end, k, ghost in (("start", 0, rope.start_ghost), ("end", -1, rope.end_ghost)):

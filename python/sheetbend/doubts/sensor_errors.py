@@ -68,7 +68,7 @@ def sensor_errors(problem: FitProblem, u: Array, i: int) -> list[SensorError]:
     measured = [each for sensor in e.forces for each in _readings(sensor)]
     ends = np.cumsum([each.values.size for each in measured])
     numbers = [end - each.values.size + np.arange(each.values.size) for end, each in zip(ends, measured, strict=True)]
-    numbered = replace(e, forces=_moved(e.forces, measured, numbers))
+    numbered = replace(e, forces=_perturbed(e.forces, measured, numbers))
     there = problem.of([numbered if k == i else other for k, other in enumerate(problem.experiments)])
     rows = slice(*problem.core.first_rows[i : i + 2])
     _, r, _ = problem.evaluate(u, jacobian=False)
@@ -102,7 +102,7 @@ def _readings(sensor: ForceSensor) -> Iterator[_Readings]:
         yield _Readings(sensor, recording.torques / sensor.torque_sigma, sensor.torque_sigma, "torque", zeros)
 
 
-def _moved(
+def _perturbed(
     sensors: Sequence[ForceSensor], measured: Sequence[_Readings], numbers: Sequence[Array]
 ) -> list[ForceSensor]:
     """The sensors with readings that are larger by so many sigma and one."""

@@ -110,7 +110,7 @@ def following(e: Experiment, motion: Recording) -> Experiment:
     if far > max(FAR * (e.driven_noise or 0.0), PART * float(np.sqrt(np.mean(sway**2)))):
         problem = f"is {1e3 * far:.3g} mm from the recorded motion (of one coordinate), as from another recording"
         raise RecordingError("driven_motion", problem, motion.name, again)
-    return _moved(e, correction, numbers)
+    return _with_corrections(e, correction, numbers)
 
 
 def corrected(e: Experiment, correction: Array) -> Experiment:
@@ -120,10 +120,10 @@ def corrected(e: Experiment, correction: Array) -> Experiment:
         return e
     full = np.zeros(every.shape)
     full[: len(numbers)] = numbers[: len(full)]
-    return _moved(e, every, full)
+    return _with_corrections(e, every, full)
 
 
-def _moved(e: Experiment, correction: Correction, numbers: Array) -> Experiment:
+def _with_corrections(e: Experiment, correction: Correction, numbers: Array) -> Experiment:
     scene = e.scene.shallow()
     scene.boundary = e.scene.boundary.moved(correction.added(e.scene.boundary.values, numbers))
     return replace(e, scene=scene)

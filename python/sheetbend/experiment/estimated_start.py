@@ -57,7 +57,7 @@ class EstimatedStart:
             fix = "give a longer part, or start = 'given'"
             raise InputError(f"{name}.start", f"cannot be estimated from fewer than {FRAMES} frames", "estimated", fix)
         kinds, length, target, weight = [], [], [], []
-        moved, rates = _shown(scene, places, fitted)
+        moved, rates = _offsets(scene, places, fitted)
         between = float(np.mean(fitted.times[2:] - fitted.times[:-2]))
         for nodes, values, shapes, extent in _pieces(scene):
             own = [k for k, place in enumerate(places) if place.body is None and set(place.particles) <= set(nodes)]
@@ -65,7 +65,7 @@ class EstimatedStart:
                 continue
             every = np.zeros((max(nodes) + 1, len(values)))
             every[nodes] = shapes
-            at = np.array([_at(places[k], every) for k in own])
+            at = np.array([_interpolated(places[k], every) for k in own])
             for kind, shown, noise in ((0, moved[:, own], sigma), (1, rates[:, own], np.sqrt(2.0) * sigma / between)):
                 deviations = _likeliest(values, at, shown, noise, extent)
                 kept = deviations >= LEAST * deviations.max()
@@ -138,19 +138,19 @@ def _modes(
     return nodes, values, shapes, extent
 
 
-def _at(place: Place, field: Array) -> Array:
+def _interpolated(place: Place, field: Array) -> Array:
     """What a marker shows of a field (nodes, ...)."""
     return np.asarray(np.array(place.weights) @ field[list(place.particles)])
 
 
-def _shown(scene: Scene, places: Sequence[Place], r: Recording) -> tuple[Array, Array]:
+def _offsets(scene: Scene, places: Sequence[Place], r: Recording) -> tuple[Array, Array]:
     """(frames, markers, 3) m, how far markers are from where the scene starts, and (frames - 2, markers, 3) m/s, how
     much their velocities differ from those that it starts with; NaN where they are not seen."""
     inputs, layout = scene.compiled.inputs(), scene.compiled.layout
 
     def seen(array: str) -> Array:
         first, count = layout[array]
-        return np.array([_at(place, inputs[first : first + count].reshape(-1, 3)) for place in places])
+        return np.array([_interpolated(place, inputs[first : first + count].reshape(-1, 3)) for place in places])
 
     rates = (r.positions[2:] - r.positions[:-2]) / (r.times[2:] - r.times[:-2])[:, None, None]
     return np.asarray(r.positions - seen("position")), np.asarray(rates - seen("velocity"))

@@ -76,7 +76,7 @@ def reading(path: str | Path, error: type[InputError] = RecordingError) -> Itera
     except (SheetbendError, Warning):  # a warning that the caller made an error stays what it is
         raise
     except Exception as problem:
-        words, fix = _told(problem)
+        words, fix = _reason_and_fix(problem)
         raise error(str(path), words, _short(problem), fix) from problem
 
 
@@ -112,7 +112,7 @@ def check_room(path: Path, what: str, size: int, in_file: int | None = None) -> 
         raise RecordingError(str(path), f"holds {what}, which is more than {limit}", in_words(size), fix)
 
 
-def _told(problem: Exception) -> tuple[str, str]:
+def _reason_and_fix(problem: Exception) -> tuple[str, str]:
     """What is wrong with the file, and the fix."""
     if isinstance(problem, MemoryError):
         return "asks for more memory than there is", "cut it into pieces, or export it again if it is damaged"

@@ -111,7 +111,7 @@ def conclude(
     judged, lower = judged_parameters(
         at.problem, at.u, refined, more, refitter if asked.profiles else None, lost, profiled
     )
-    judged = at_floor_of_sweeps(_moved(judged, at.moved), at.refits)
+    judged = at_floor_of_sweeps(_with_shifts(judged, at.moved), at.refits)
     if refitter is not None and asked.profiles and not lost:
         judged = bounded_by_sticking(at.problem, at.u, judged, refitter)
     predicted = predicted_values(compared, wanted, values, refitter, asked.threads)
@@ -154,6 +154,6 @@ def _doubts(
     return warnings, together(*lacking, drawn_off, contradicted)
 
 
-def _moved(judged: Identifiability, by: Mapping[str, float]) -> Identifiability:
+def _with_shifts(judged: Identifiability, by: Mapping[str, float]) -> Identifiability:
     """With how far each estimate was moved to the limit of short substeps."""
     return replace(judged, estimates=tuple(replace(e, moved=by.get(e.name, 0.0)) for e in judged.estimates))

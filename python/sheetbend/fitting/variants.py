@@ -37,14 +37,14 @@ def changes(experiments: Sequence[Experiment], free: Parameters, wanted: Paramet
     if any(new is not e for new, e in zip(felt, experiments, strict=True)):
         yield "a force sensor at the support", felt, wanted
     again = [replace(e, recording=_named(e.recording, f"{e.name} again"), name=f"{e.name} again") for e in experiments]
-    yield "the same recordings once more", [*experiments, *again], _apart(experiments, wanted)
+    yield "the same recordings once more", [*experiments, *again], _with_private_inputs(experiments, wanted)
     for name, p in wanted.items():
         if p.free and p.log and p.prior is None and not p.private and name in free and p.initial is not None:
             known = wanted.replace(name, prior=(p.initial, MEASURED))
             yield f"{name} measured to {100 * MEASURED:g} %", list(experiments), known
 
 
-def _apart(experiments: Sequence[Experiment], wanted: Parameters) -> Parameters:
+def _with_private_inputs(experiments: Sequence[Experiment], wanted: Parameters) -> Parameters:
     """The parameters, those of unknown inputs over time private: each recording has its own."""
     modes = modes_over_time(experiments)
     return Parameters(replace(p, private=True) if p.name in modes else p for p in wanted.values()) if modes else wanted

@@ -40,12 +40,14 @@ def on_time(recording: Recording) -> tuple[Recording, tuple[str, ...]]:
     step = float(np.median(np.diff(times)))
     words = []
     if repeated.any():
-        words.append(f"{_counted(int(repeated.sum()))} the one before ({_at(recording, np.flatnonzero(repeated))})")
+        words.append(
+            f"{_counted(int(repeated.sum()))} the one before ({_frames_in_words(recording, np.flatnonzero(repeated))})"
+        )
     if missing.any():
         where = kept[1:][missing > 0]
         lost = int(missing.sum())
         count = f"{lost} frame was" if lost == 1 else f"{lost} frames were"
-        words.append(f"{count} lost before {_at(recording, where)}: later times count them")
+        words.append(f"{count} lost before {_frames_in_words(recording, where)}: later times count them")
     later = step * np.concatenate([[0], np.cumsum(missing)])
     return replace(recording, times=times + later, positions=positions), tuple(words)
 
@@ -54,7 +56,7 @@ def _counted(frames: int) -> str:
     return "1 frame that is left out repeats" if frames == 1 else f"{frames} frames that are left out repeat"
 
 
-def _at(recording: Recording, frames: NDArray[np.int64]) -> str:
+def _frames_in_words(recording: Recording, frames: NDArray[np.int64]) -> str:
     first = f"frame {frames[0]} ({recording.times[frames[0]]:.4g} s)"
     return first if len(frames) == 1 else f"{first} and {len(frames) - 1} later"
 

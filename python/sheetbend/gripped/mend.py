@@ -49,7 +49,7 @@ def mended(
     """
     recording, told = on_time(recording)
     times, tracks = recording.times, range(recording.positions.shape[1])
-    least, lost = _least_jump(times, recording.positions), _lost(recording)
+    least, lost = _least_jump(times, recording.positions), _written_as_zeros(recording)
     positions, words = _in_order(recording, inner, usual)
     words = [*told, *_each(recording, lost, "lay exactly at the origin"), *words]
     frozen = np.stack([_frozen(times, positions[:, k]) for k in tracks], axis=1) & ~_resting(positions)[:, None]
@@ -67,7 +67,7 @@ def mended(
 def steadied_order(recording: Recording) -> tuple[Array, Mask]:
     """Positions (frames, markers, 3) m with the same order of neighbors in all frames, that of most frames, and NaN in
     place of zeros; (pairs, frames) where a pair was exchanged for that."""
-    positions = np.where(_lost(recording)[:, :, None], np.nan, recording.positions)
+    positions = np.where(_written_as_zeros(recording)[:, :, None], np.nan, recording.positions)
     wrong = np.zeros((positions.shape[1] - 1, len(positions)), dtype=bool)
     least = _least_jump(recording.times, positions)
     for k in range(len(wrong)):
@@ -149,7 +149,7 @@ def _exchange(positions: Array, k: int, which: Mask) -> None:
     positions[frames, [k, k + 1]] = positions[frames, [k + 1, k]]
 
 
-def _lost(recording: Recording) -> Mask:
+def _written_as_zeros(recording: Recording) -> Mask:
     """(frames, markers) written as zeros."""
     least = _least_jump(recording.times, recording.positions)
     tracks = range(recording.positions.shape[1])

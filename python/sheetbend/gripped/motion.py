@@ -140,7 +140,7 @@ class GrippedMotion:
 
     def shown(self, frame: int) -> bool:
         """Whether at least half of the free markers are seen about a frame: a motion can start there."""
-        return _shown(self.positions[frame], self.inner)
+        return _mostly_seen(self.positions[frame], self.inner)
 
     def start(self, frame: int) -> tuple[Array, Array]:
         """Points (k, 3) m along a smooth curve through the markers between the grips, and velocities (k, 3) m/s;
@@ -197,14 +197,14 @@ def _check_shown(recording: Recording, positions: Array, chords: Array, inner: t
         names = [recording.markers[k] for k in (same[0], same[0] + 1)]
         problem = f"of {recording.name} are at the same place throughout"
         raise RecordingError("markers", problem, names, "leave one out with `Recording.select`")
-    if not _shown(positions[0], inner):
-        later = [f"{t:g} s" for t, x in zip(recording.times, positions, strict=True) if _shown(x, inner)]
+    if not _mostly_seen(positions[0], inner):
+        later = [f"{t:g} s" for t, x in zip(recording.times, positions, strict=True) if _mostly_seen(x, inner)]
         fix = f"save the recording from {later[0] if later else 'a later frame'} on (`Recording.piece`)"
         problem = f"of {recording.name} are less than half seen in the first frames"
         raise RecordingError("markers", problem, float(recording.times[0]), fix)
 
 
-def _shown(positions: Array, inner: tuple[int, int]) -> bool:
+def _mostly_seen(positions: Array, inner: tuple[int, int]) -> bool:
     return 2 * int(np.isfinite(positions[inner[0] + 1 : inner[1], 0]).sum()) >= inner[1] - inner[0] - 1
 
 

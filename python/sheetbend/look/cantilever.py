@@ -67,7 +67,7 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     base = tuple(sorted({*s.still, *(k for k in s.loose if k in r.clamped)}))
     if len(base) < 2 or len(base) + len(tip) < len(r.markers):
         return None
-    beam = _looked_at(s, base, tip, measured.length)
+    beam = _beam_of(s, base, tip, measured.length)
     if beam is None:
         return None
     notes = [
@@ -94,7 +94,7 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     return Description("a beam clamped at one end", notes, unknown, _lines(takes[0], tip, beam, measured))
 
 
-def _looked_at(s: Seen, base: tuple[int, ...], tip: tuple[int, ...], length: float | None) -> Beam | None:
+def _beam_of(s: Seen, base: tuple[int, ...], tip: tuple[int, ...], length: float | None) -> Beam | None:
     x, t = s.recording.positions, s.recording.times
     x = interpolate(t, x, t, "cubic", default_max_gap(t))
     whole = np.isfinite(x[:, list(tip), 0]).all(axis=1)

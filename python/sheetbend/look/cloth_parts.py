@@ -25,7 +25,7 @@ def cloth_parts(s: Seen) -> tuple[dict[str, list[int]], list[int]]:
     held_by = gripping(s)
     left = [k for k, stem in enumerate(stems) if k not in held_by and (not common or stem in common)]
     left = _in_step(s.apart, left)
-    sheets = _apart(s.apart, left)
+    sheets = _connected_sets(s.apart, left)
     cloths = {_name(stems, own, n, len(sheets)): own for n, own in enumerate(sheets)}
     on_cloth = {k for own in sheets for k in own}
     return cloths, [k for k in range(len(stems)) if k not in on_cloth]
@@ -40,14 +40,14 @@ def _in_step(apart: Array, among: list[int]) -> list[int]:
     return [among[k] for k in np.flatnonzero(has)] if 1.0 - has.mean() < FEW else among
 
 
-def _apart(apart: Array, among: list[int]) -> list[list[int]]:
+def _connected_sets(apart: Array, among: list[int]) -> list[list[int]]:
     """Sets of markers that hang together, each at its own spacing, the largest first."""
     if len(among) < FEWEST_OF_SHEET:
         return []
     found = [[among[k] for k in own] for own in components(apart[np.ix_(among, among)])]
     if len(found) == 1:
         return found
-    return sorted((part for own in found for part in _apart(apart, own)), key=len, reverse=True)
+    return sorted((part for own in found for part in _connected_sets(apart, own)), key=len, reverse=True)
 
 
 def _name(stems: list[str], own: list[int], number: int, count: int) -> str:

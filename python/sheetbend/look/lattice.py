@@ -34,7 +34,7 @@ def in_rows(apart: Array, flat: Array) -> Array | None:
         apart: (markers, markers) m, the largest distance of every two over time.
     """
     best, least, near = None, LONGER, np.zeros(apart.shape, dtype=bool)
-    for cells in (*_shown(flat), *_numbered(len(apart))):
+    for cells in (*_rows_and_columns(flat), *_numbered(len(apart))):
         layout = _laid_out(cells, apart)
         if layout is None:
             continue
@@ -53,7 +53,7 @@ def _alike(layout: Array, flat: Array, near: Array, apart: Array) -> bool:
     return float(np.median(np.abs(other / one - 1.0))) < SAME and not bent > max(BENT, 2.0 * off)
 
 
-def _shown(flat: Array) -> Iterator[Array]:
+def _rows_and_columns(flat: Array) -> Iterator[Array]:
     """(markers, 2) whole numbers, the columns and rows in which a layout shows the markers."""
     cells = np.zeros(flat.shape, dtype=int)
     for axis, pitch in enumerate(pitches(flat)):

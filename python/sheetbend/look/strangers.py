@@ -33,7 +33,7 @@ def rare(recording: Recording) -> Strangers | None:
     """Markers that are hardly ever seen."""
     often = recording.mask.mean(axis=0)
     found = np.flatnonzero(often < RARE * often.max())
-    return _told(recording, found, "seen in less than a fifth of the frames, and left out")
+    return _strangers(recording, found, "seen in less than a fifth of the frames, and left out")
 
 
 def restless(recording: Recording, noise: Array) -> Strangers | None:
@@ -50,7 +50,7 @@ def restless(recording: Recording, noise: Array) -> Strangers | None:
         others = np.delete(x, k, axis=1)
         size = np.linalg.norm(np.subtract(*np.nanquantile(others, [0.99, 0.01], axis=(0, 1))))
         found += [int(k)] if noise[k] > WILD * size else []
-    return _told(recording, found, "somewhere else in every frame, as reflections are, and left out")
+    return _strangers(recording, found, "somewhere else in every frame, as reflections are, and left out")
 
 
 def of_the_room(recording: Recording, still: Array, distance: Array, noise: Array) -> Strangers | None:
@@ -79,12 +79,12 @@ def of_the_room(recording: Recording, still: Array, distance: Array, noise: Arra
         holds |= more  # the line goes on where it hangs still
     object_ = np.concatenate([moving, resting[holds]])
     size = float(mean[np.ix_(object_, object_)].max())
-    return _told(
+    return _strangers(
         recording, resting[~holds & (away > OUTSIDE * size)], "in one place, far from what moves, and left out"
     )
 
 
-def _told(recording: Recording, found: Array | list[int], how: str) -> Strangers | None:
+def _strangers(recording: Recording, found: Array | list[int], how: str) -> Strangers | None:
     if not len(found):
         return None
     names = [recording.markers[k] for k in found]

@@ -72,7 +72,7 @@ def settled(
             before = found
             for i in range(len(found)):
                 found = (*found[:i], picture.likeliest(found, i), *found[i + 1 :])
-            if all(_apart(a, b) < SETTLED for a, b in zip(before, found, strict=True)):
+            if all(_distance(a, b) < SETTLED for a, b in zip(before, found, strict=True)):
                 break
         if picture is not None:
             found = tuple(picture.bounded(found, i) for i in range(len(found)))
@@ -88,7 +88,7 @@ def _carried(fields: Sequence[Field], parameters: Parameters) -> Parameters:
     return parameters
 
 
-def _apart(a: Field, b: Field) -> float:
+def _distance(a: Field, b: Field) -> float:
     return max(abs(math.log(b.size / a.size)), abs(math.log(b.length / a.length)))
 
 
@@ -185,7 +185,7 @@ class Picture:
     def likeliest(self, fields: Sequence[Field], i: int) -> Field:
         """One field with the size and the length that are most likely."""
         given = fields[i].wanted
-        size, length = _looked_at(fields[i])
+        size, length = _axes(fields[i])
         size = _closer(size)
         heights = self.heights(fields, i, size, length)
         best = np.unravel_index(int(np.argmin(heights)), heights.shape)
@@ -216,13 +216,13 @@ class Picture:
     ) -> tuple[Array, Array]:
         """Logarithms of sizes and lengths of one field, as many as were looked at, between the outermost whose height
         is below a limit and one more on either side."""
-        size, length = among or _looked_at(fields[i])
+        size, length = among or _axes(fields[i])
         over = self.heights(fields, i, size, length)
         over -= over.min()
         return _narrowed(size, over.min(axis=1), limit), _narrowed(length, over.min(axis=0), limit)
 
 
-def _looked_at(field: Field) -> tuple[Array, Array]:
+def _axes(field: Field) -> tuple[Array, Array]:
     """Logarithms of sizes and of lengths; one of what is given."""
     modes, given = field.modes, field.wanted
     wave = 1.0 / math.sqrt(max(float(modes.eigenvalues[-1]), 1e-300))

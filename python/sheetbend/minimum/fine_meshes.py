@@ -81,10 +81,10 @@ def at_the_limit(
             if name in near and of[name].verdict in CARRIED and of[name].half_width is not None:
                 limit[column] += made.to_limit * (there[column] - u[column])
     limit = np.where(limit == u, u, np.clip(limit, lower, upper))
-    return tuple(_moved(parameters, e, u, limit) for e in estimates), limit
+    return tuple(_shifted(parameters, e, u, limit) for e in estimates), limit
 
 
-def _moved(parameters: Parameters, e: Estimate, start: Array, end: Array) -> Estimate:
+def _shifted(parameters: Parameters, e: Estimate, start: Array, end: Array) -> Estimate:
     column, p = parameters.free.index(e.name), parameters[e.name]
     by = float(end[column] - start[column])
     if by == 0.0 or e.lower is None or e.upper is None or e.half_width is None:

@@ -105,13 +105,15 @@ def growths(problem: FitProblem, u: Array) -> tuple[Growth, ...]:
             windows it is the largest within a window, of some of them.
     """
     return tuple(
-        growth(e, float(r.times[-1]) - e.t0, problem.values_of(e, u)) if shot(e) is None else _within(problem, i, u)
+        growth(e, float(r.times[-1]) - e.t0, problem.values_of(e, u))
+        if shot(e) is None
+        else _growth_of_windows(problem, i, u)
         for i, (e, r) in enumerate(zip(problem.experiments, problem.recordings, strict=True))
         if not e.static
     )
 
 
-def _within(problem: FitProblem, i: int, u: Array) -> Growth:
+def _growth_of_windows(problem: FitProblem, i: int, u: Array) -> Growth:
     e, core = problem.experiments[i], problem.core
     assert isinstance(core, Lifted)
     motion, names = core.motions[i], start_quantities(e.scene)

@@ -69,7 +69,7 @@ def settle(problem: FitProblem, u: np.ndarray, optimizer: str = "auto") -> Settl
         if all(map(can_be_combined, problem.experiments)):
             try:
                 limit = problem.of(combined(problem.experiments))
-                found = _moved(problem, limit, u)
+                found = _to_short_substeps(problem, limit, u)
             except SheetbendError:  # a run at a fourth of the substep may have no answer where one at half has
                 return _counted_whole(problem, u)
             try:
@@ -96,7 +96,7 @@ def combined(experiments: Sequence[Experiment]) -> list[Experiment]:
     ]
 
 
-def _moved(problem: FitProblem, limit: FitProblem, u: np.ndarray) -> Settled:
+def _to_short_substeps(problem: FitProblem, limit: FitProblem, u: np.ndarray) -> Settled:
     there = residuals_there(problem, limit, u)  # raises where the combination has no answer at u
     _, r, J = problem.evaluate(u)
     first = gauss_newton(problem.parameters, u, J, there - r)

@@ -188,13 +188,14 @@ def _hang(
     own = scene.add_particles(np.tile(root, (len(points), 1)), 0.0).tolist()
     carried = carrier.motion if carrier else ()
     motions = [
-        tuple(_at(p, t) for t in carried) + _swing(name, p, *where) for p, where in zip(own, points, strict=True)
+        tuple(_for_particle(p, t) for t in carried) + _swing(name, p, *where)
+        for p, where in zip(own, points, strict=True)
     ]
     scene.add_terms([t for motion in motions for t in motion])
     return Arm(name, carrier.end if carrier else fixed[0], own[0], (*fixed, *own), root, motions[0])
 
 
-def _at(particle: int, t: Term) -> Term:
+def _for_particle(particle: int, t: Term) -> Term:
     return replace(t, index=3 * particle + t.index % 3)
 
 

@@ -90,7 +90,7 @@ def fitted_motion(found: Fit, c: Comparison) -> Shown:
         "held_out": c.held_out,
     }
     positions = fitted_positions(found, c)
-    return _shown(e.name, e.scene, c.recording.times[: len(positions)], positions, recorded)
+    return _motion_shown(e.name, e.scene, c.recording.times[: len(positions)], positions, recorded)
 
 
 def predicted_motion(recording: Recording, predicted: Array) -> Shown:
@@ -113,7 +113,7 @@ def of_trajectory(scene: Scene, motion: Trajectory, name: str = "") -> Shown:
 
 def of_positions(scene: Scene, times: Array, positions: Array, name: str = "") -> Shown:
     """A scene whose nodes are at positions (frames, nodes, 3) m at times (frames,) s."""
-    return _shown(name or scene.name, scene, times, positions, {})
+    return _motion_shown(name or scene.name, scene, times, positions, {})
 
 
 def of_recording(recording: Recording, name: str) -> Shown:
@@ -123,7 +123,7 @@ def of_recording(recording: Recording, name: str) -> Shown:
     return Shown(name, recording.times, markers=names, is_cloud=is_cloud, measured=x, up=up)
 
 
-def _shown(name: str, scene: Scene, times: Array, positions: Array, recorded: Mapping[str, object]) -> Shown:
+def _motion_shown(name: str, scene: Scene, times: Array, positions: Array, recorded: Mapping[str, object]) -> Shown:
     lines = {rope.name: positions[:, rope.particles] for rope in scene.ropes.values()}
     sheets = {
         c.name: _sheet(c.mesh, positions[:, c.particles], "solid" if c.name in scene.solids else "cloth")

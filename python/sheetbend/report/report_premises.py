@@ -35,12 +35,12 @@ def premises(result: FitData) -> Section:
         listed.append(((p.name, value, p.words), p, (sd,) if counted else ()))
     ends = ("sd counted",) if counted else ()
     headers = ("given", "value", "if off by", *(e.name for e in closed), *ends)
-    rows = [(*before, *(_moved(p, e) for e in closed), *after) for before, p, after in listed]
+    rows = [(*before, *(_shift_in_words(p, e) for e in closed), *after) for before, p, after in listed]
     if len(closed) > PREMISE_COLUMNS or wide((headers, *rows)):
         most = [max(closed, key=lambda e, p=p: strength(p, e)) for _, p, _ in listed]  # type: ignore[misc]
         headers = ("given", "value", "if off by", "moves most", "half-widths", *ends)
         rows = [
-            (*before, f"{e.name} {_moved(p, e)}", short(strength(p, e), 2), *after)
+            (*before, f"{e.name} {_shift_in_words(p, e)}", short(strength(p, e), 2), *after)
             for (before, p, after), e in zip(listed, most, strict=True)
         ]
     notes = _rests_on(every, closed, strength) if rows else ()
@@ -56,7 +56,7 @@ def premises(result: FitData) -> Section:
     return Section("What the result rests on", headers, tuple(rows), notes)
 
 
-def _moved(premise: Premise, e: Estimate) -> str:
+def _shift_in_words(premise: Premise, e: Estimate) -> str:
     moved = premise.moved.get(e.name)
     if moved is None:
         return ""

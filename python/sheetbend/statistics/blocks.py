@@ -194,7 +194,7 @@ def _compared(
     moved[physical] = solved(every[:, physical], known, rcond=None)
     full, whole = np.zeros(every.shape[1]), np.zeros((every.shape[1], every.shape[1]))
     full[used], whole[np.ix_(used, used)] = step, V
-    return _told(
+    return _by_parameter(
         chance, split, shared, full, whole, moved, float(require("scipy.special", "fit").stdtrit(degrees, 0.975))
     )
 
@@ -227,7 +227,7 @@ def independent(every: Array) -> list[int]:
     return [c for c in range(len(names)) if c not in pivots]
 
 
-def _told(
+def _by_parameter(
     chance: float, split: Split, shared: list[int], step: Array, V: Array, moved: Array, t: float
 ) -> Contradiction:
     """The contradiction in terms of single parameters: for each, the part that differs most from the others."""

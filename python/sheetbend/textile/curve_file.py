@@ -84,13 +84,13 @@ def _curves(
 
 
 def _size(path: Path, tables: Sequence[TextTable], field: str, given: float | str | None) -> float | None:
-    size = _told(path, tables, field, given) if isinstance(given, str) else given
+    size = _length_in_preamble(path, tables, field, given) if isinstance(given, str) else given
     if size is not None and not (math.isfinite(size) and size > 0):
         raise InputError(field, "must be positive", given, "give m")
     return size
 
 
-def _told(path: Path, tables: Sequence[TextTable], field: str, words: str) -> float:
+def _length_in_preamble(path: Path, tables: Sequence[TextTable], field: str, words: str) -> float:
     """m, what the preamble says behind some words: "Width;50;mm", "Width: 50 mm", "Width (mm) = 50"."""
     for table in tables:
         for line, cells in table.preamble:

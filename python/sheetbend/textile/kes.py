@@ -112,7 +112,7 @@ def shear_loop(
         Reading(_mean(sides, lambda c: _slope(c, low, high)), "N/m", {}, "gf/(cm deg)", math.radians(_GF_PER_CM)),
         None if near is None else Reading(near, "N/m", {}, "gf/cm", _GF_PER_CM),
         None if far is None else Reading(far, "N/m", {}, "gf/cm", _GF_PER_CM),
-        _lost(sides),
+        _share_lost(sides),
     )
 
 
@@ -137,7 +137,7 @@ def bending_loop(
     return BendingLoop(
         Reading(_mean(sides, lambda c: _slope(c, low, high)), "N m", {}, "gf cm^2/cm", 100.0 / GRAM_FORCE),
         None if width is None else Reading(width, "N", {}, "gf cm/cm", 1.0 / GRAM_FORCE),
-        _lost(sides),
+        _share_lost(sides),
     )
 
 
@@ -170,7 +170,7 @@ def _mean(sides: Sequence[Cycle], of: Callable[[Cycle], float]) -> float:
     return float(np.mean([of(side) for side in sides]))
 
 
-def _at(branch: Curve, deformation: float) -> float:
+def _load_at(branch: Curve, deformation: float) -> float:
     """Load at a deformation to the branch's side; NaN where it does not go."""
     sign = math.copysign(1.0, float(branch.deformation[np.abs(branch.deformation).argmax()]))
     return sign * branch.load_at(sign * deformation)
@@ -178,7 +178,7 @@ def _at(branch: Curve, deformation: float) -> float:
 
 def _slope(side: Cycle, low: float, high: float) -> float:
     x, out = np.linspace(low, high, _POINTS), side.loading
-    load = np.array([_at(out, d) for d in x])
+    load = np.array([_load_at(out, d) for d in x])
     if np.isnan(load).any():
         reach = f"{out.deformation.min():.4g} to {out.deformation.max():.4g}"
         fix = "choose slope= so that the test passes it"
@@ -187,10 +187,10 @@ def _slope(side: Cycle, low: float, high: float) -> float:
 
 
 def _width(sides: Sequence[Cycle], at: float) -> float | None:
-    widths = [_at(s.loading, at) - _at(s.unloading, at) for s in sides if s.unloading is not None]
+    widths = [_load_at(s.loading, at) - _load_at(s.unloading, at) for s in sides if s.unloading is not None]
     return float(np.mean(widths)) if len(widths) == len(sides) and not np.isnan(widths).any() else None
 
 
-def _lost(sides: Sequence[Cycle]) -> float | None:
+def _share_lost(sides: Sequence[Cycle]) -> float | None:
     lost = [side.lost for side in sides]
     return None if None in lost else float(np.mean([part for part in lost if part is not None]))

@@ -30,7 +30,7 @@ def joined(
     x = positions.copy()
     kept = {k: [k] for k in range(len(names))}
     spans = {k: _span(x[:, k]) for k in kept if unnamed[k]}
-    links = sorted((found, a, b) for b in spans for a in spans if (found := _apart(times, x, spans, a, b)) is not None)
+    links = sorted((found, a, b) for b in spans for a in spans if (found := _gap(times, x, spans, a, b)) is not None)
     after: dict[int, int] = {}
     for _, a, b in links:
         if a not in after and b not in after.values():
@@ -52,7 +52,7 @@ def _span(x: Array) -> tuple[int, int]:
     return int(seen[0]), int(seen[-1])
 
 
-def _apart(times: Array, x: Array, spans: dict[int, tuple[int, int]], a: int, b: int) -> float | None:
+def _gap(times: Array, x: Array, spans: dict[int, tuple[int, int]], a: int, b: int) -> float | None:
     """m between the ends of path a and of piece b, led on to half-way; None where b does not go on a."""
     last, first = spans[a][1], spans[b][0]
     gap = times[first] - times[last]

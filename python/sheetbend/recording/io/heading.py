@@ -64,7 +64,7 @@ def _with_names(above: list[str], header: list[str]) -> list[str]:
     return [header[0], *(f"{names[k // 3]} {name}" for k, name in enumerate(header[1:]))]
 
 
-def _told(name: str, own: str) -> str | None:
+def _unit_above(name: str, own: str) -> str | None:
     """The unit that the name of a column has, above the one that stands below it."""
     if clock.unit(name) is not None and clock.unit(f"{name} [{own}]") is None:
         return clock.unit(name)
@@ -73,12 +73,12 @@ def _told(name: str, own: str) -> str | None:
 
 def _agree(name: str, own: str) -> bool:
     """Whether the name of a column has no unit, or that which stands below it."""
-    return not own or _told(name, own) in (None, own)
+    return not own or _unit_above(name, own) in (None, own)
 
 
 def _with_unit(name: str, own: str) -> str:
     """The name of a column with its unit, unless it has one."""
-    return name if not own or _told(name, own) is not None else f"{name} [{own}]"
+    return name if not own or _unit_above(name, own) is not None else f"{name} [{own}]"
 
 
 def _units(cells: list[str]) -> list[str] | None:
