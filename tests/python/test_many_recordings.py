@@ -84,6 +84,21 @@ def test_triangles_say_what_the_dense_jacobian_says() -> None:
         assert arrow.inside(ridge, lower, upper) == approx(exact, rel=1e-6, abs=1e-9)
 
 
+def test_a_wrong_given_number_is_not_taken_for_noise_in_silence() -> None:
+    """A length 2 % too large: EI was 13 % too large, "identified" at 8 half-widths, and the misfit of 3.9 sigma stood
+    in a table. A fit to three of the recordings names the length."""
+    longer = sb.rope(0.51, 4, density=0.05, clamp_start=(1, 0, 0), EI=1e-3, bend_damping=0.01, drag_linear=0.01)
+    wrong = [replace(e, scene=longer) for e in swings()]
+    found = sb.fit_many(wrong, WANTED)
+    assert found["rope_EI"].verdict == "identified" and found["rope_EI"].lower > 1.1e-3
+    (warning,) = found.warnings
+    assert "missed by 3.9" in warning and "sheetbend.fit" in warning
+    assert warning.split()[0] in found.report().partition("Recordings")[0]
+    few = sb.fit(wrong[:3], parameters=WANTED, profiles=False).result
+    assert few["rope_EI"].verdict == "doubtful" and any("rope_length were 1.9 % less" in w for w in few.warnings)
+    assert fitted().warnings == ()
+
+
 def test_a_fit_of_many_recordings_ends_where_that_of_all_at_once_does() -> None:
     found = fitted()
     plain = sb.fit(swings(), parameters=WANTED, refine=False, beginnings=False, profiles=False, tolerance=1e-12)

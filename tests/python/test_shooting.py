@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -25,6 +26,8 @@ from sheetbend.minimum.optimizers import walked
 from sheetbend.minimum.parts import expanded_to
 from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.progress import Progress
+from sheetbend.report.report_shot import shot_motions
+from sheetbend.result.shot import ShotMotion
 from sheetbend.statistics.chain import Chain, Gap, Window
 
 RATE, NOISE = 50.0, 2e-4
@@ -249,6 +252,14 @@ def test_kicks_that_the_model_does_not_know_are_what_it_loses() -> None:
     e = soft["arm_hinge_viscosity"]
     assert e.lower is not None and e.upper is not None and e.lower < 2e-4 < e.upper
     assert hard.result.recordings[0].rms > 3 * soft.result.recordings[0].rms  # type: ignore[operator]
+
+
+def test_gaps_are_said_to_hide_a_friction_that_the_model_lacks() -> None:
+    """With 1 mN m of dry friction missing, viscosity was twice too large, "identified", since the gaps took it up."""
+    told = ShotMotion(name="a", windows=8, length=0.4, numbers=2, loss=5e-4, lower=3e-4, upper=8e-4, gap=1e-4, pace=0.1)
+    for lower, hides in ((3e-4, True), (None, True), (0.0, False)):
+        section = shot_motions(SimpleNamespace(shot=(replace(told, lower=lower),)))  # type: ignore[arg-type]
+        assert ("A friction or drag that the model lacks" in dict(section.notes)["the model loses"]) is hides
 
 
 def test_given_numbers_are_not_asked_for_what_a_shot_motion_leaves() -> None:

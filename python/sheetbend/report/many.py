@@ -27,6 +27,7 @@ FORMAT = "sheetbend many 2"
 SHARES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 LABELS = [f"{100 * share:g} %" for share in SHARES]
 FAR = 2.0  # times the median misfit: such recordings are named
+MUCH = 1.7  # sigma, the median misfit above which a warning says that the model misses most recordings
 NAMED = 5
 
 
@@ -96,6 +97,18 @@ class ManyFit:
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of a shared parameter; KeyError names the ones there are."""
         return estimate_of(self.estimates, name)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What speaks against the fit as a whole."""
+        most = float(np.median(self.misfit))
+        if not most > MUCH:
+            return ()
+        return (
+            f"half of the recordings are missed by {short(most, 3)} sigma or more, and the intervals take that for "
+            "noise. The model lacks something, or a given value or sigma is wrong: fit three of them with "
+            "sheetbend.fit, which looks for the cause",
+        )
 
     def report(self) -> str:
         """The report as plain text."""
@@ -167,15 +180,15 @@ class ManyFit:
             shared.append((name, value, ends, unit, more, verdict))
         words = "standard deviation from the scatter between recordings over that of independent residuals"
         headers = ("parameter", "value", "95 % interval", "unit", "scatter", "verdict")
-        note = ("scatter", f"{words}; the larger counts")
+        notes = [("scatter", f"{words}; the larger counts"), *(("warning", w) for w in self.warnings)]
         open_ones = [(e.name, e.words) for e in self.estimates if e.verdict not in ("identified", "weak")]
         own = [(p.name, *(short(x) for x in _spread(p.values)), p.unit, _typical(p)) for p in self.own]
         misfit = ("misfit", *(short(x, 3) for x in np.quantile(self.misfit, SHARES)), "sigma", "")
         far = sorted(zip(self.misfit, self.recordings, strict=True), reverse=True)
         far = [(x, name) for x, name in far if x > FAR * float(np.median(self.misfit))]
-        notes = [(name, f"its misfit is {short(x, 3)} sigma") for x, name in far[:NAMED]]
+        missed = [(name, f"its misfit is {short(x, 3)} sigma") for x, name in far[:NAMED]]
         if len(far) > NAMED:
-            notes.append(("and", f"{len(far) - NAMED} further recordings above {FAR:g} times the median"))
+            missed.append(("and", f"{len(far) - NAMED} further recordings above {FAR:g} times the median"))
         end = "converged" if self.converged else "did NOT converge"
         course = (
             ("fit", f"{end} after {self.iterations} iterations, {self.seconds:.3g} s"),
@@ -187,8 +200,8 @@ class ManyFit:
         )
         each = ("of each recording", *LABELS, "unit", "its own half-width")
         return [
-            Section("Shared parameters", headers, tuple(shared), (note, *open_ones)),
-            Section("Recordings (shares that lie below)", each, (*own, misfit), tuple(notes)),
+            Section("Shared parameters", headers, tuple(shared), (*notes, *open_ones)),
+            Section("Recordings (shares that lie below)", each, (*own, misfit), tuple(missed)),
             Section("Course", notes=course),
         ]
 

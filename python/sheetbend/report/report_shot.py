@@ -7,6 +7,11 @@ from ..result.result import FitData
 from ..result.shot import ShotMotion
 from .tables import Section
 
+PUSHES = (
+    ", if these come at random. A friction or drag that the model lacks moves the parameters, and only a fit "
+    "without `shooting` looks for it"
+)
+
 
 def shot_motions(result: FitData) -> Section:
     """How motions were cut, and what the model loses in each."""
@@ -22,7 +27,8 @@ def shot_motions(result: FitData) -> Section:
         (
             "the model loses",
             "by so much per second a window misses the next one; the intervals of the parameters "
-            "hold for gaps of this size",
+            "hold for gaps of this size"
+            + (PUSHES if any(m.lower is None or m.lower > 0.0 for m in result.shot) else ""),
         ),
         (
             "gap",
