@@ -1,8 +1,11 @@
 #include "core/solver/body_loops.h"
 
+#include <algorithm>
 #include <map>
 #include <numeric>
 #include <tuple>
+
+#include "core/constraints/rigid.h"
 
 namespace sheetbend {
 namespace {
@@ -43,6 +46,11 @@ bool closes_loop(const Scene& scene, const std::vector<Member>& members) {
     joined[a] = b;
   }
   return false;
+}
+
+void order_bodies_first(const Scene& scene, std::vector<Member>& members) {
+  const int rigid = kind_of(Rigid::name);
+  std::ranges::stable_partition(members, [&](const Member& m) { return scene.groups[m.group].kind == rigid; });
 }
 
 }  // namespace sheetbend

@@ -15,4 +15,8 @@ inline constexpr double pivot_of_loop = 1e-6;  // 1e-3 rad
 // both, whatever its kind; by more rows they are joined twice. A single row, as of a spring or a stop, joins nothing.
 bool closes_loop(const Scene& scene, const std::vector<Member>& members);
 
+// Puts what makes bodies rigid before what joins them, each in its order, so that of rows that say the same those of joints are left out: a joint in place of
+// a body's own row may hold it by a short lever. It adds nothing to the factor, since the joints of a body share all of its axes.
+void order_bodies_first(const Scene& scene, std::vector<Member>& members);
+
 }  // namespace sheetbend

@@ -189,6 +189,7 @@ DirectBlock make_block(const Scene& scene, std::vector<Member> members, const So
       condensed ? FactorStructure(0, {}) : structure_of(scene, members, volumes, users, loop_pivot);
   if (!condensed && !structure.banded()) {
     order_for_low_fill(scene, members);
+    if (loop_pivot > 0.0) order_bodies_first(scene, members);
     users = number_rows(scene, members, volumes);
     structure = structure_of(scene, members, volumes, users, loop_pivot);
   }
