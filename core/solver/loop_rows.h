@@ -11,18 +11,6 @@ namespace sheetbend {
 
 inline constexpr double beyond_all = 1e150;  // D of such a row, whose square is still a number
 
-// Of one scene at least.
-template <class T>
-bool is_rigid(const T& D) {
-  if constexpr (std::is_same_v<T, Pack>) {
-    for (int lane = 0; lane < Pack::lanes; ++lane)
-      if (D[lane] == 0.0) return true;
-    return false;
-  } else {
-    return value_of(D) == 0.0;
-  }
-}
-
 // The inverse pivots of the rigid rows of a condensed block in J W J^T + D, as of any constraints' matrix; one for all other rows.
 template <class T>
 std::vector<T> inverse_pivots_of_rigid(const BlockNumbers<T>& block, double least) {
