@@ -10,6 +10,7 @@
 #include <string>
 
 #include "core/linear/low_fill.h"
+#include "core/solver/assemblies.h"
 #include "core/solver/block_frames.h"
 #include "core/solver/body_loops.h"
 #include "core/solver/ordering.h"
@@ -374,6 +375,7 @@ DirectBlock make_block(const Scene& scene, std::vector<Member> members, const So
 Plan make_plan(const Scene& scene, const SolverOptions& options) {
   check_solver(scene, options);
   Plan plan{options, {}, {}, {}};
+  assemble_balls(scene, plan);
   if (options.partition == Partition::gauss_seidel) {
     plan.colors = color_constraints(scene);
     plan.packs = pack_colors(scene, plan.colors);
