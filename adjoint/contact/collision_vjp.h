@@ -12,29 +12,32 @@ BallPair<S> collided_vjp(const ImpactRule& rule, const BallPair<S>& pair, const 
                          const std::array<Flight<S>, 2>& after_bar) {
   constexpr int all = BallPair<S>::numbers, flight = Flight<S>::numbers, directions = 8;
   using D = Dual<S, directions>;
+  const int count = pair.count();
   S given[all], seed[2 * flight], bar[all];
   int i = 0;
   BallPair<S>::each(pair, [&](const S& a) { given[i++] = a; });
   i = 0;
   for (const Flight<S>& own : after_bar) Flight<S>::each(own, [&](const S& a) { seed[i++] = a; });
-  for (int first = 0; first < all; first += directions) {
-    const int count = std::min(directions, all - first);
+  for (int first = 0; first < count; first += directions) {
+    const int some = std::min(directions, count - first);
     BallPair<D> p;
+    p.joined = pair.joined;
     i = 0;
     BallPair<D>::each(p, [&](D& a) {
       a = D(given[i]);
-      if (i >= first && i < first + count) a.d[i - first] = S(1.0);
+      if (i >= first && i < first + some) a.d[i - first] = S(1.0);
       ++i;
     });
-    for (int k = 0; k < count; ++k) bar[first + k] = S(0.0);
+    for (int k = 0; k < some; ++k) bar[first + k] = S(0.0);
     i = 0;
     for (const Flight<D>& after : collided(rule, p, meeting))
       Flight<D>::each(after, [&](const D& a) {
-        for (int k = 0; k < count; ++k) bar[first + k] += seed[i] * a.d[k];
+        for (int k = 0; k < some; ++k) bar[first + k] += seed[i] * a.d[k];
         ++i;
       });
   }
   BallPair<S> pair_bar;
+  pair_bar.joined = pair.joined;
   i = 0;
   BallPair<S>::each(pair_bar, [&](S& a) { a = bar[i++]; });
   return pair_bar;

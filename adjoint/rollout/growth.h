@@ -21,16 +21,16 @@ class CotangentGrowth {
   // Cotangents (dofs) that the loss has at a state.
   void seed(const T* x_bar, std::size_t size) {
     for (std::size_t i = 0; i < size; ++i)
-      for (int lane = 0; lane < lanes_in<T>; ++lane)
-        largest_[lane] = std::max(largest_[lane], std::abs(plain(x_bar[i], lane)));
+      for (int lane = 0; lane < scenes_of<T>; ++lane)
+        largest_[lane] = std::max(largest_[lane], std::abs(number_of(x_bar[i], lane)));
   }
 
   // Throws Diverged where those at `step` have grown beyond meaning.
   void look(int step, double t, const Scene& scene, const T* x_bar) const {
     for (int n = 0; n < scene.nodes(); ++n)
       for (int d = 0; d < scene.dim[n]; ++d)
-        for (int lane = 0; lane < lanes_in<T>; ++lane) {
-          const double grown = std::abs(plain(x_bar[scene.first_dof[n] + d], lane));
+        for (int lane = 0; lane < scenes_of<T>; ++lane) {
+          const double grown = std::abs(number_of(x_bar[scene.first_dof[n] + d], lane));
           if (!(grown <= most * largest_[lane])) throw Diverged(step, n, t, seen(grown / largest_[lane]));
         }
   }
@@ -42,7 +42,7 @@ class CotangentGrowth {
            " times from the frames that the loss looks at back to here, so that rounding errors decide it";
   }
 
-  std::array<double, lanes_in<T>> largest_{};
+  std::array<double, scenes_of<T>> largest_{};
 };
 
 }  // namespace sheetbend

@@ -28,19 +28,12 @@ void solve_implicit(const Scene& whole, const DirectBlock& block, Scenes scenes,
     if (!has(scenes, scene)) continue;
     ImplicitBlock& implicit = state.implicit[scene];
     const RigidRows& rigid = implicit.rigid();
-    std::vector<Single<T>> mu(rigid.size());
-    if constexpr (std::is_same_v<T, Pack>) {
-      std::vector<double> own(z.size());
-      for (std::size_t i = 0; i < z.size(); ++i) own[i] = z[i][scene];
-      for (int j = 0; j < rigid.size(); ++j) mu[j] = y[rigid.row(j)][scene];
-      implicit.solve_transposed(whole, block, own.data(), mu.data());
-      for (std::size_t i = 0; i < z.size(); ++i) z[i].set(scene, own[i]);
-      for (int j = 0; j < rigid.size(); ++j) y[rigid.row(j)].set(scene, mu[j]);
-    } else {
-      for (int j = 0; j < rigid.size(); ++j) mu[j] = y[rigid.row(j)];
-      implicit.solve_transposed(whole, block, z.data(), mu.data());
-      for (int j = 0; j < rigid.size(); ++j) y[rigid.row(j)] = mu[j];
-    }
+    std::vector<Single<T>> own(z.size()), mu(rigid.size());
+    for (std::size_t i = 0; i < z.size(); ++i) own[i] = in_scene(z[i], scene);
+    for (int j = 0; j < rigid.size(); ++j) mu[j] = in_scene(y[rigid.row(j)], scene);
+    implicit.solve_transposed(whole, block, own.data(), mu.data());
+    for (std::size_t i = 0; i < z.size(); ++i) set_in_scene<T>(own[i], scene, z[i]);
+    for (int j = 0; j < rigid.size(); ++j) set_in_scene<T>(mu[j], scene, y[rigid.row(j)]);
   }
 }
 
@@ -53,13 +46,8 @@ void keep_rigid_rows(BlockState<T>& state, const std::vector<T>& y, std::vector<
     for (int j = 0; j < rigid.size(); ++j) {
       const int row = rigid.row(j);
       const T left = rest[row] - Jp[row] + state.diagonal[row] * y[row];
-      if constexpr (std::is_same_v<T, Pack>) {
-        bar.y[row].set(scene, y[row][scene]);
-        rest[row].set(scene, left[scene]);
-      } else {
-        bar.y[row] = y[row];
-        rest[row] = left;
-      }
+      set_in_scene<T>(in_scene(y[row], scene), scene, bar.y[row]);
+      set_in_scene<T>(in_scene(left, scene), scene, rest[row]);
     }
   }
 }

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "adjoint/solver/contact_source_vjp.h"
+#include "adjoint/solver/joined_balls_vjp.h"
 #include "adjoint/step/stages.h"
 #include "core/step/bounce.h"
 
@@ -39,7 +40,7 @@ struct ReverseOf<Bounce> {
         if (impact->lane != lane) continue;
         for (const auto& f : impact->flown())
           if (!flights.contains(f.node)) flights.emplace(f.node, last_flight(source, f.node, bar));
-        reverse(source, poses, *impact, flights, poses_bar, bar.in);
+        reverse(source, step.plan, poses, *impact, flights, poses_bar, bar);
       }
       for (const auto& [node, f_bar] : flights) first_flight(source, node, f_bar, bar);
       poses_vjp(source, poses_bar, bar.in);
@@ -48,10 +49,11 @@ struct ReverseOf<Bounce> {
 
  private:
   template <class T>
-  static void reverse(const ContactSource<T>& source, const ColliderPoses<Single<T>>& poses,
+  static void reverse(const ContactSource<T>& source, const Plan& plan, const ColliderPoses<Single<T>>& poses,
                       const Impact<Single<T>>& impact, std::map<int, Flight<Single<T>>>& flights,
-                      ColliderPoses<Single<T>>& poses_bar, const Inputs<T>& in_bar) {
+                      ColliderPoses<Single<T>>& poses_bar, const StepCotangents<T>& bar) {
     using S = Single<T>;
+    const Inputs<T>& in_bar = bar.in;
     const auto& [one, other] = impact.both;
     if (impact.contact >= 0) {
       Surface<S> surface_bar{};
@@ -60,8 +62,7 @@ struct ReverseOf<Bounce> {
                           impact.meeting.time, f_bar, surface_bar);
       return surface_vjp(source, impact.contact, surface_bar, poses_bar, in_bar);
     }
-    const BallPair<S> pair =
-        pair_of(source, ball_of(source, one.ball, one.before), ball_of(source, other.ball, other.before));
+    const BallPair<S> pair = pair_of(source, plan, one.ball, other.ball, one.before, other.before);
     const BallPair<S> pair_bar =
         collided_vjp(rule_of_balls(source), pair, impact.meeting, {flights.at(one.node), flights.at(other.node)});
     const Balls& balls = source.scene.balls;
@@ -72,6 +73,7 @@ struct ReverseOf<Bounce> {
     };
     back(one, pair_bar.one), back(other, pair_bar.other);
     source.add(pair_bar.restitution, in_bar.of(Quantity::restitution)[balls.restitution]);
+    if (pair.joined) taken_vjp(source, plan, one.ball, other.ball, pair_bar.D, bar.from.x, in_bar);
   }
 
   // v = v_end + (x_next - x_end)/eta, where UpdateVelocities has (x_next - history)/eta.

@@ -3,6 +3,10 @@
 //
 //   push = (1 + e) |n . w|        w: velocity of one less that of the other at the impact, n along their centers, e: restitution
 //   v1  += m2/(m1 + m2) push n,   v2 -= m1/(m1 + m2) push n
+//
+// Where constraints join them to more, the push moves that too, and has to be larger for the approach to end in (1 + e) of it:
+//
+//   push = (1 + e) |n . w| (1/m1 + 1/m2)/(1/m1 + 1/m2 - n . D n)       D: core/solver/joined_balls.h
 #pragma once
 
 #include <array>
@@ -20,9 +24,13 @@ struct Ball {
 
 template <class S>
 struct BallPair {
-  static constexpr int numbers = 2 * (Flight<S>::numbers + 2) + 1;
+  static constexpr int alone = 2 * (Flight<S>::numbers + 2) + 1, numbers = alone + 9;
   Ball<S> one, other;
   S restitution{};
+  bool joined = false;  // whether D is asked for
+  std::array<Vec3<S>, 3> D{};
+
+  int count() const { return joined ? numbers : alone; }
 
   template <class Self, class F>
   static void each(Self& p, F&& visit) {
@@ -31,6 +39,8 @@ struct BallPair {
       visit(ball->radius), visit(ball->mass);
     }
     visit(p.restitution);
+    if (p.joined)
+      for (auto& column : p.D) visit(column.x), visit(column.y), visit(column.z);
   }
 };
 
@@ -71,6 +81,9 @@ Surface<S> sphere_around(const BallPair<S>& p, bool rests) {
   return s;
 }
 
+// Of the inverse mass of two balls, what joints must leave of it.
+inline constexpr double least_yielding = 1e-9;
+
 // Deeper than this share of their radii together, overlapping balls hit each other: rounding is no impact.
 inline constexpr double no_overlap = 1e-12;
 
@@ -106,6 +119,14 @@ inline std::optional<BallMeeting> meeting_of(const ImpactRule& rule, const BallP
   return found;
 }
 
+// By how much more two push each other that are joined to others. What nothing can move along n is pushed as if it were alone.
+template <class S>
+S joined_push(const BallPair<S>& p, const Vec3<S>& n) {
+  const S free = S(1.0) / p.one.mass + S(1.0) / p.other.mass;
+  const S rest = free - (n.x * dot(p.D[0], n) + n.y * dot(p.D[1], n) + n.z * dot(p.D[2], n));
+  return value_of(rest) > least_yielding * value_of(free) ? free / rest : S(1.0);
+}
+
 // Both flights after a meeting, whose time one step of Newton's method makes that of a scalar with tangents.
 template <class S>
 std::array<Flight<S>, 2> collided(const ImpactRule& rule, const BallPair<S>& p, const BallMeeting& meeting) {
@@ -116,7 +137,9 @@ std::array<Flight<S>, 2> collided(const ImpactRule& rule, const BallPair<S>& p, 
     const Approach<S> near(rule, both.apart, s, t);
     t = t - near.gap / near.rate;
   }
-  const Vec3<S> kick = (S(1.0) / (p.one.mass + p.other.mass)) * kick_of(Approach<S>(rule, both.apart, s, t), s);
+  const Approach<S> a(rule, both.apart, s, t);
+  Vec3<S> kick = (S(1.0) / (p.one.mass + p.other.mass)) * kick_of(a, s);
+  if (p.joined) kick = joined_push(p, a.normal) * kick;
   const auto after = [&](const Flight<S>& f, const Vec3<S>& own) {
     return kicked(Moment<S>(rule.curved, f, t), f, t, own);
   };

@@ -23,6 +23,18 @@ auto coefficient(const T& a) {
     return value_of(a);
 }
 
+// Whether a row with this D does not give way, of one lane at least.
+template <class T>
+bool is_rigid(const T& D) {
+  if constexpr (std::is_same_v<T, Pack>) {
+    for (int lane = 0; lane < Pack::lanes; ++lane)
+      if (D[lane] == 0.0) return true;
+    return false;
+  } else {
+    return value_of(D) == 0.0;
+  }
+}
+
 template <class T>
 struct BlockNumbers {
   const T *gradients,

@@ -92,17 +92,6 @@ class CondensedSolver {
     for (std::size_t v = 0; v < border_.size(); ++v) y[border_[v]] = p[v];
   }
 
-  // Of one scene at least.
-  static bool is_rigid(const T& D) {
-    if constexpr (std::is_same_v<T, Pack>) {
-      for (int lane = 0; lane < Pack::lanes; ++lane)
-        if (D[lane] == 0.0) return true;
-      return false;
-    } else {
-      return value_of(D) == 0.0;
-    }
-  }
-
   // z = H^-1 z
   template <class U>
   void solve_particles(const Condensation& plan, U* z, U* room) const {

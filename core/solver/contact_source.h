@@ -2,38 +2,16 @@
 // of a pack's scenes are looked at one after the other.
 #pragma once
 
-#include <type_traits>
-
 #include "core/contact/impact.h"
 #include "core/contact/pose.h"
 #include "core/contact/rebound.h"
 #include "core/contact/touch.h"
-#include "core/scalar/pack.h"
 #include "core/scene/point_of.h"
 #include "core/scene/scene.h"
 #include "core/solver/options.h"
 #include "core/solver/states.h"
 
 namespace sheetbend {
-
-// A number of one scene of T.
-template <class T>
-using Single = std::conditional_t<std::is_same_v<T, Pack>, double, T>;
-
-template <class T>
-Single<T> in_scene(const T& a, [[maybe_unused]] int scene) {
-  if constexpr (std::is_same_v<T, Pack>)
-    return a[scene];
-  else
-    return a;
-}
-template <class T>
-void add_in_scene(const Single<T>& a, [[maybe_unused]] int scene, T& to) {
-  if constexpr (std::is_same_v<T, Pack>)
-    to.set(scene, to[scene] + a);
-  else
-    to += a;
-}
 
 template <class S>
 struct ColliderPoses {
@@ -56,10 +34,7 @@ struct ContactSource {
   Vec3<S> at(const T* state, int node) const { return read(Vec3<T>(state + scene.first_dof[node])); }
 
   void write(const Vec3<S>& v, T* to) const {
-    if constexpr (std::is_same_v<T, Pack>)
-      to[0].set(lane, v.x), to[1].set(lane, v.y), to[2].set(lane, v.z);
-    else
-      v.store(to);
+    set_in_scene<T>(v.x, lane, to[0]), set_in_scene<T>(v.y, lane, to[1]), set_in_scene<T>(v.z, lane, to[2]);
   }
   void add(const S& a, T& to) const { add_in_scene(a, lane, to); }
   void add(const Vec3<S>& v, T* to) const { add(v.x, to[0]), add(v.y, to[1]), add(v.z, to[2]); }

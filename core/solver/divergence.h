@@ -21,6 +21,7 @@
 
 #include "core/scalar/pack.h"
 #include "core/solver/plan.h"
+#include "core/solver/scenes.h"
 
 namespace sheetbend {
 
@@ -60,24 +61,6 @@ class StateCheck {
   double kinetic_ = 0.0, widening_ = 0.0;  // the largest that were in order
 };
 
-// The value of a scalar, in one of its lanes.
-template <class T>
-double plain(const T& a, [[maybe_unused]] int lane) {
-  if constexpr (std::is_same_v<T, double>)
-    return a;
-  else if constexpr (requires { a.re; })
-    return a.re;
-  else if constexpr (requires { a.d; })
-    return plain(a.v, lane);
-  else
-    return a[lane];
-}
-
-template <class T>
-inline constexpr int lanes_in = 1;
-template <int N>
-inline constexpr int lanes_in<Lanes<N>> = N;
-
 // Looks at every lane of a rollout now and then; it neither changes nor keeps anything of the rollout.
 template <class T>
 class Watch {
@@ -88,11 +71,11 @@ class Watch {
       : scene_(scene),
         in_(in),
         start_(start, start + scene.dofs()),
-        checks_(lanes_in<T>, StateCheck(scene, options, t0)) {}
+        checks_(scenes_of<T>, StateCheck(scene, options, t0)) {}
 
   // Throws Diverged.
   void look(int step, double t, const T* x, const T* v) {
-    for (int lane = 0; lane < lanes_in<T>; ++lane) {
+    for (int lane = 0; lane < scenes_of<T>; ++lane) {
       const std::vector<double> start = lane_of(start_.data(), start_.size(), lane),
                                 xs = lane_of(x, start.size(), lane), vs = lane_of(v, start.size(), lane),
                                 mass = lane_of(in_.of(Quantity::mass), scene_.nodes(), lane);
@@ -107,7 +90,7 @@ class Watch {
  private:
   static std::vector<double> lane_of(const T* from, std::size_t size, int lane) {
     std::vector<double> to(size);
-    for (std::size_t i = 0; i < size; ++i) to[i] = plain(from[i], lane);
+    for (std::size_t i = 0; i < size; ++i) to[i] = number_of(from[i], lane);
     return to;
   }
 

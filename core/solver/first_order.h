@@ -6,11 +6,10 @@
 
 #include <algorithm>
 #include <array>
-#include <type_traits>
 
-#include "core/scalar/pack.h"
 #include "core/scene/scene.h"
 #include "core/solver/options.h"
+#include "core/solver/scenes.h"
 
 namespace sheetbend {
 
@@ -18,32 +17,6 @@ namespace sheetbend {
 inline bool changes_at_contacts(const Scene& scene, const SolverOptions& o) {
   return o.integrator == Integrator::bdf2 &&
          (!scene.contacts.empty() || !scene.self_contact.empty() || !scene.balls.empty());
-}
-
-// Scenes of a T: the lanes of a pack, otherwise one.
-template <class T>
-inline constexpr int scenes_of = std::is_same_v<T, Pack> ? Pack::lanes : 1;
-
-// Some of them, a bit each.
-using Scenes = unsigned char;
-static_assert(Pack::lanes <= 8);
-
-template <class T>
-inline constexpr Scenes all_scenes = static_cast<Scenes>((1u << scenes_of<T>)-1u);
-
-inline bool has(Scenes scenes, int scene) { return (scenes >> scene & 1) != 0; }
-
-// a in some scenes, b in the others.
-template <class T>
-T chosen(Scenes scenes, const T& a, const T& b) {
-  if constexpr (std::is_same_v<T, Pack>) {
-    T mixed = b;
-    for (int scene = 0; scene < Pack::lanes; ++scene)
-      if (has(scenes, scene)) mixed.set(scene, a[scene]);
-    return mixed;
-  } else {
-    return scenes ? a : b;
-  }
 }
 
 // How many substeps of BDF1 each scene has before it since a contact began, or one since a particle bounced, which has no history then. Part of a state.

@@ -26,12 +26,7 @@ struct PairSource {
         lane(lane_),
         spots(block_.surface, [&](std::size_t i) { return read(s.inputs.of(Quantity::contact_weight)[i]); }) {}
 
-  S read(const T& a) const {
-    if constexpr (std::is_same_v<T, Pack>)
-      return a[lane];
-    else
-      return a;
-  }
+  S read(const T& a) const { return in_scene(a, lane); }
   int second_side(const BlockPair& pair) const { return pair.key.triangle ? 1 : 2; }  // where it begins
   int radius_of(const BlockPair& pair, int k) const { return block.surface.radius[pair.spots[k]]; }
   S inverse_mass(int particle) const {

@@ -5,6 +5,7 @@
 #include <span>
 #include <utility>
 
+#include "core/solver/assemblies.h"
 #include "core/solver/make_block.h"
 #include "core/solver/ordering.h"
 #include "core/solver/plan_checks.h"
@@ -65,6 +66,7 @@ std::vector<int> loose_in_contact(const Scene& scene, const std::vector<DirectBl
 Plan make_plan(const Scene& scene, const SolverOptions& options) {
   check_solver(scene, options);
   Plan plan{options, {}, {}, {}};
+  assemble_balls(scene, plan);
   if (options.partition == Partition::gauss_seidel) {
     plan.colors = color_constraints(scene);
     plan.packs = pack_colors(scene, plan.colors);

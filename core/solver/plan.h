@@ -94,6 +94,16 @@ struct SweptGroup {
   bool packed() const { return !nodes.empty(); }
 };
 
+// Constraints that join balls to other particles, with the rows of their matrix (joined_balls.h).
+struct Assembly {
+  struct Use {
+    int member, place;  // a constraint, and which of its nodes it is
+  };
+  std::vector<Member> members;                           // in elimination order
+  FactorStructure structure;                             // of J M^-1 J^T + a
+  std::vector<std::pair<int, std::vector<Use>>> joined;  // nodes that can move, ascending, with what uses them
+};
+
 struct Plan {
   SolverOptions options;
   std::vector<Color> colors;
@@ -101,6 +111,8 @@ struct Plan {
   std::vector<DirectBlock> blocks;
   std::vector<SweptContact> contacts = {};      // between sweeps, in the order of the scene
   std::vector<SweptGroup> contact_groups = {};  // the same, one for each contact of the scene
+  std::vector<Assembly> assemblies = {};
+  std::vector<int> assembly_of_ball = {};  // per ball: its place in `assemblies`, or -1
 };
 
 // Iterations over blocks and colors that a record for the reverse holds; an implicit step is known by where it ends.

@@ -9,15 +9,6 @@
 
 namespace sheetbend {
 
-// A number of one scene.
-template <class T>
-double number_of(const T& a, [[maybe_unused]] int scene) {
-  if constexpr (std::is_same_v<T, Pack>)
-    return a[scene];
-  else
-    return value_of(a);
-}
-
 // The length of a body's axis is that of its mass's moments about the center.
 template <class T>
 void find_units(const SubstepState<T>& s, const DirectBlock& block, IncrementalPotential& potential, int scene) {
@@ -236,10 +227,7 @@ void set_rigid(BlockState<T>& state) {
   for (int scene = 0; scene < static_cast<int>(state.implicit.size()); ++scene) {
     const RigidRows& rigid = state.implicit[scene].rigid();
     for (int j = 0; j < rigid.size(); ++j)
-      if constexpr (std::is_same_v<T, Pack>)
-        state.lambda[0][rigid.row(j)].set(scene, rigid.lambda[j]);
-      else
-        state.lambda[0][rigid.row(j)] = T(rigid.lambda[j]);
+      set_in_scene<T>(Single<T>(rigid.lambda[j]), scene, state.lambda[0][rigid.row(j)]);
   }
 }
 
@@ -280,11 +268,9 @@ void write_solution(const SubstepState<T>& s, const DirectBlock& block, BlockSta
   if constexpr (is_plain<T>) {
     for (int p = 0; p < block.movable; ++p)
       for (int d = 0; d < 3; ++d) {
-        T& to = state.x[0][row_of(p) + d];
-        if constexpr (std::is_same_v<T, Pack>)
-          for (int scene = 0; scene < Pack::lanes; ++scene) to.set(scene, state.implicit[scene].x()[row_of(p) + d]);
-        else
-          to = state.implicit[0].x()[row_of(p) + d];
+        const std::size_t at = row_of(p) + d;
+        for (int scene = 0; scene < scenes_of<T>; ++scene)
+          set_in_scene<T>(state.implicit[scene].x()[at], scene, state.x[0][at]);
       }
   } else {
     std::vector<T> x(3 * block.particles.size());
@@ -307,10 +293,7 @@ void keep_rigid(const std::vector<T>& lambda, BlockState<T>& state) {
     const RigidRows& rigid = state.implicit[scene].rigid();
     for (int j = 0; j < rigid.size(); ++j) {
       const int row = rigid.row(j);
-      if constexpr (std::is_same_v<T, Pack>)
-        dl[row].set(scene, lambda[row][scene]);
-      else
-        dl[row] = lambda[row];
+      set_in_scene<T>(in_scene(lambda[row], scene), scene, dl[row]);
       state.lambda[0][row] = dl[row];
     }
   }

@@ -21,8 +21,9 @@ class BallFlights {
   using S = Single<T>;
 
   // Lets them fly to the end of a substep: adds their impacts, and writes where those that have bounced fly to. Memory is kept for the next substep.
-  void fly(const ContactSource<T>& source, const ColliderPoses<S>& poses, const Coordinates<T>& q,
+  void fly(const ContactSource<T>& source, const Plan& plan, const ColliderPoses<S>& poses, const Coordinates<T>& q,
            std::vector<Impact<S>>& impacts) {
+    plan_ = &plan;
     begin(source, poses, q);
     for (int i = 0; i < count(); ++i) {
       look_for_surfaces(i);
@@ -165,7 +166,7 @@ class BallFlights {
   Impact<S> hit(const Event& event) {
     Flying &one = flying_[event.one], &other = flying_[event.other];
     const BallMeeting meeting{event.time, event.dated, event.rests};
-    const BallPair<S> before = pair_of(*source_, one.ball, other.ball);
+    const BallPair<S> before = pair_of(*source_, *plan_, event.one, event.other, one.ball.flight, other.ball.flight);
     const auto after = collided(rule_of_balls(*source_), before, meeting);
     one.ball.flight = after[0], other.ball.flight = after[1];
     const Flown<S> first = flown(event.one, before.one.flight), second = flown(event.other, before.other.flight);
@@ -194,6 +195,7 @@ class BallFlights {
   }
 
   const ContactSource<T>* source_ = nullptr;  // of the substep, as the next
+  const Plan* plan_ = nullptr;
   const ColliderPoses<S>* poses_ = nullptr;
   std::vector<Flying> flying_;
   std::vector<std::pair<int, Surface<double>>> surfaces_;

@@ -33,7 +33,7 @@ struct Bounce {
       const auto& poses = (*work.poses)[lane];
       for (const Bouncer& bouncer : scene.bouncers) fly(source, poses, bouncer, work, record);
       if (scene.balls.empty()) continue;
-      record.balls.fly(source, poses, work.q, record.impacts);
+      record.balls.fly(source, step.plan, poses, work.q, record.impacts);
     }
     work.impacts = &record.impacts;
   }

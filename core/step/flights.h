@@ -1,6 +1,7 @@
 // The flights of a substep: of a particle from its state at n to its free end, and what it may bounce off.
 #pragma once
 
+#include "core/solver/joined_balls.h"
 #include "core/step/step.h"
 
 namespace sheetbend {
@@ -35,9 +36,14 @@ Ball<Single<T>> ball_of(const ContactSource<T>& source, int ball, const Flight<S
   return {flight, source.read(source.in.of(Quantity::contact_radius)[balls.first_radius + ball]),
           source.read(source.in.of(Quantity::mass)[balls.members[ball].node])};
 }
+// Two that hit each other, balls i and k.
 template <class T>
-BallPair<Single<T>> pair_of(const ContactSource<T>& source, const Ball<Single<T>>& one, const Ball<Single<T>>& other) {
-  return {one, other, source.read(source.in.of(Quantity::restitution)[source.scene.balls.restitution])};
+BallPair<Single<T>> pair_of(const ContactSource<T>& source, const Plan& plan, int i, int k, const Flight<Single<T>>& f,
+                            const Flight<Single<T>>& g) {
+  BallPair<Single<T>> pair{ball_of(source, i, f), ball_of(source, k, g),
+                           source.read(source.in.of(Quantity::restitution)[source.scene.balls.restitution])};
+  if (const auto D = taken_of(source, plan, i, k)) pair.joined = true, pair.D = *D;
+  return pair;
 }
 
 }  // namespace sheetbend

@@ -219,6 +219,7 @@ TEST_P(JugglingBalls, HaveTheSameBitsWhateverKeepsTheirStates) {
 
 // Two balls on rigid strings, one in a chain of springs, and a free one; the chain falls on a plane.
 struct Strung {
+  Sample (*scene)();
   Partition partition;
   Integrator integrator;
 };
@@ -237,6 +238,25 @@ Sample strung_balls() {
   return b.build(g);
 }
 
+// A ball at the end of a bent row of rods, one of them stiff and damped, and two dumbbells that fly against it.
+Sample balls_on_rods() {
+  ContactBuilder b;
+  const Vec3<double> a(-0.6, 0.2, -0.1), c(0.9, 0.1, -0.2), d(-1.2, 0.3, 0.1);
+  b.particle({0.0, 0.0, 0.05}, 0.3, a), b.particle({0.03, 0.004, 0.05}, 0.2, a), b.particle({0.05, 0.02, 0.06}, 0.1, a);
+  b.particle({-0.028, 0.003, 0.048}, 0.15, c), b.particle({-0.05, -0.01, 0.05}, 0.25, c);
+  b.particle({0.09, 0.024, 0.063}, 0.1, d), b.particle({0.11, 0.02, 0.07}, 0.05, d);
+  const auto rod = [&](int i, int k, double compliance) {
+    b.constraint("distance", {i, k}, compliance, {norm(Vec3<double>(&b.x[3 * i]) - Vec3<double>(&b.x[3 * k]))});
+  };
+  rod(0, 1, 0.0), rod(1, 2, 1e-6), rod(3, 4, 0.0), rod(5, 6, 1e-5);
+  b.constraint("hinge", {0, 1, 2}, 1e-3, {0.0, 0.0, 1.0, 0.54});
+  b.spec.groups[0].damped = true;
+  b.balls({0, 2, 3, 5}, {0.012, 0.013, 0.014, 0.012}, 0.8);
+  Sample s = b.build(0.0);
+  for (int i = 0; i < 4; ++i) s.inputs[s.scene.layout.of(Quantity::damping) + i] = i == 1 ? 0.05 : 0.01 * i;
+  return s;
+}
+
 class StrungBalls : public ::testing::TestWithParam<Strung> {
  protected:
   static Program of(const Sample& s) {
@@ -247,13 +267,16 @@ class StrungBalls : public ::testing::TestWithParam<Strung> {
   }
 };
 INSTANTIATE_TEST_SUITE_P(Collisions, StrungBalls,
-                         ::testing::Values(Strung{Partition::implicit, Integrator::bdf1},
-                                           Strung{Partition::implicit, Integrator::bdf2},
-                                           Strung{Partition::gauss_seidel, Integrator::bdf1},
-                                           Strung{Partition::gauss_seidel, Integrator::bdf2}));
+                         ::testing::Values(Strung{strung_balls, Partition::implicit, Integrator::bdf1},
+                                           Strung{strung_balls, Partition::implicit, Integrator::bdf2},
+                                           Strung{strung_balls, Partition::gauss_seidel, Integrator::bdf1},
+                                           Strung{strung_balls, Partition::gauss_seidel, Integrator::bdf2},
+                                           Strung{balls_on_rods, Partition::implicit, Integrator::bdf1},
+                                           Strung{balls_on_rods, Partition::gauss_seidel, Integrator::bdf2},
+                                           Strung{balls_on_rods, Partition::direct, Integrator::bdf1}));
 
 TEST_P(StrungBalls, HaveTheGradientOfComplexSteps) {
-  const Sample s = strung_balls();
+  const Sample s = GetParam().scene();
   const Program p = of(s);
   Rollout<double> rollout(s.scene, p.plan, s.inputs.data());
   std::set<int> hit;
@@ -262,14 +285,18 @@ TEST_P(StrungBalls, HaveTheGradientOfComplexSteps) {
     for (const auto& impact : rollout.impacts())
       for (const auto& flown : impact.flown()) hit.insert(flown.node);
   }
-  EXPECT_EQ(hit, (std::set<int>{0, 1, 2, 3}));
-  EXPECT_GT(times_touching(p, s.inputs), 3);
+  std::set<int> balls;
+  for (const Bouncer& ball : s.scene.balls.members) balls.insert(ball.node);
+  EXPECT_EQ(hit, balls);
+  if (!s.scene.contacts.empty()) {
+    EXPECT_GT(times_touching(p, s.inputs), 3);
+  }
   const auto loss_of = [&](const std::vector<Complex>& probe) { return loss(p, probe); };
   expect_sums_agree(s.scene.layout, loss_of, s.inputs, gradient(p, s.inputs), 1e-8);
 }
 
 TEST_P(StrungBalls, HaveTheSameBitsWhateverKeepsTheirStates) {
-  const Sample s = strung_balls();
+  const Sample s = GetParam().scene();
   const Program p = of(s);
   expect_bits_of_any_tape(p, s.inputs);
   InputsOfLanes inputs(Pack::lanes, s.inputs);

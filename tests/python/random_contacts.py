@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import time
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import sheetbend as sb
@@ -26,9 +26,11 @@ FRICTIONS = (0.0, 0.05, 0.3, 1.0)
 # What a direction changes by 1: m, m/s, m/s^2; everything else by its own size.
 UNITS = {"position": 1e-2, "velocity": 0.1, "gravity": 0.3, "collider_pose": 1e-2, "boundary": 1e-2}
 FIELD = icosphere(0.06, 2)
+WIDER = 50_000
+"""From this seed on: also dumbbells, flattened meshes and tethered bodies. Earlier ones keep their scenes."""
 
 
-def shape(rng: Draw, name: str) -> tuple[sb.Collider, str]:
+def shape(rng: Draw, name: str, wider: bool) -> tuple[sb.Collider, str]:
     """A shape whose surface is near the plane z = 0 below the middle."""
     kind = rng.choice(["plane", "tilted", "sphere", "capsule", "cylinder", "box", "field"])
     size = rng.uniform(0.04, 0.15)
@@ -49,7 +51,12 @@ def shape(rng: Draw, name: str) -> tuple[sb.Collider, str]:
     elif kind == "box":
         made = sb.Box(center=(0, 0, -0.05), size=(0.3, 0.2, 0.1), edge_radius=rng.choice([0.01, 0.03]), name=name)
     else:
-        made = sb.DistanceField(FIELD, spacing=0.012, position=(0, 0, -0.06), name=name)
+        mesh = FIELD
+        if wider and rng.random() < 0.5:
+            kind, flat = "flat field", rng.uniform([0.8, 0.8, 0.4], [1.5, 1.5, 0.9])
+            mesh = replace(FIELD, vertices=np.asarray(FIELD.vertices) * flat)
+        low = float(np.asarray(mesh.vertices)[:, 2].min())
+        made = sb.DistanceField(mesh, spacing=0.012, position=(0, 0, low), name=name)
     if rng.random() < 0.4:
         knots = np.array([[0, 0, 0], rng.uniform(-0.02, 0.02, 3), rng.uniform(-0.04, 0.04, 3)])
         turns = np.array([[0, 0, 0], rng.uniform(-0.2, 0.2, 3), rng.uniform(-0.4, 0.4, 3)])
@@ -81,7 +88,9 @@ def drawn(seed: int) -> Drawn:
     told: list[str] = []
     scene = sb.Scene(f"drawn {seed}", gravity=(*rng.uniform(-1, 1, 2), -9.81))
     what = rng.choice(["points", "balls", "rope", "rod", "cloth", "body", "bodies", "ropes", "folded", "mixed"])
-    swept = what in ("points", "balls", "rope", "cloth") and rng.random() < 0.4
+    if seed >= WIDER and rng.random() < 0.4:
+        what = rng.choice(["dumbbells", "tethered"])
+    swept = what in ("points", "balls", "dumbbells", "rope", "cloth") and rng.random() < 0.4
     told.append(str(what))
     touching: list[object] = []
     points: dict[int, Array] = {}
@@ -131,6 +140,27 @@ def drawn(seed: int) -> Drawn:
             scene.add_constraints("distance", strings, name="strings", compliance=compliance)
             told.append(f"{len(strings)} on strings")
         touching.append(ids)
+    elif what == "dumbbells":
+        n = int(rng.integers(2, 4))
+        aside, high = rng.uniform(-0.004, 0.004, n), rng.uniform(0.02, 0.05, n)
+        middle = np.column_stack([0.065 * np.arange(n) - 0.06, aside, high])
+        along = 0.013 * (rng.uniform(-0.4, 0.4, (n, 3)) + np.array([1, 0, 0]))
+        x = np.concatenate([middle - along, middle + along])
+        apart = np.tile(rng.uniform(-1, 1, (n, 3)) - np.outer(np.arange(n), [2, 0, 0]), (2, 1))
+        ids = scene.add_particles(x, rng.uniform(0.01, 0.1, 2 * n), thrown(rng, 2 * n) + apart)
+        compliance = float(rng.choice([0.0, 1e-7, 1e-4]))
+        scene.add_constraints("distance", np.column_stack([ids[:n], ids[n:]]), name="rods", compliance=compliance)
+        scene.add_collisions(ids, radius=0.01, restitution=float(rng.choice([0.0, 0.5, 1.0])))
+        told.append(f"compliance {compliance:g}")
+        touching.append(ids)
+    elif what == "tethered":
+        body("box", up)
+        hook = scene.add_particles(above(up, 0.1)[None], 1.0)
+        scene.pin(hook)
+        box = scene.bodies["box"]
+        scene.add_constraints(
+            "distance", [[hook[0], box.particles[0]]], name="string", compliance=float(rng.choice([0.0, 1e-4]))
+        )
     elif what == "rope":
         rope("rope", up - [0.06, 0, 0], np.array([1, rng.uniform(-0.4, 0.4), rng.uniform(0, 0.5)]), 5)
     elif what == "rod":
@@ -187,7 +217,7 @@ def drawn(seed: int) -> Drawn:
                 radius=[0.006, 0.015], friction=float(rng.choice(FRICTIONS)),
             )  # fmt: skip
             told.append("capsules")
-    shapes = [shape(rng, f"shape{k}") for k in range(1 + (rng.random() < 0.3))]
+    shapes = [shape(rng, f"shape{k}", seed >= WIDER) for k in range(1 + (rng.random() < 0.3))]
     for collider, kind in shapes:
         law = rng.choice(["rigid", "soft", "dissipating", "bouncing"], p=[0.4, 0.15, 0.15, 0.3])
         friction = float(rng.choice(FRICTIONS))
@@ -264,6 +294,27 @@ def derivatives(drawing: Drawn, rng: Draw, along: Array | None = None) -> Deriva
     return Derivatives(x_dot, central, sides, (float((x_dot * weights).sum()), float(bar @ along)), size)
 
 
+def same_bits(drawing: Drawn, rng: Draw) -> str:
+    """What changes bits, in words: states that are computed again, or other scenes in the lanes of vectors."""
+    compiled, frames = drawing.scene.compiled, drawing.frames
+    core, inputs = drawing.solver.core(compiled), compiled.inputs()
+    bar = rng.standard_normal((len(frames), np.asarray(core.simulate(inputs, frames, 0.0)["positions"]).shape[1]))
+    states, tape = core.record(inputs, frames, 0.0)
+    expected = core.vjp(inputs, tape, frames, bar, 0.0)
+    told = []
+    few = core.record(inputs, frames, 0.0, core.tape_plan(frames).least)[1]
+    if not np.array_equal(core.vjp(inputs, few, frames, bar, 0.0), expected):
+        told.append("bits of checkpoints")
+    others = np.stack([inputs, inputs * (1 + 1e-9 * rng.standard_normal(len(inputs))), inputs])
+    beside = np.asarray(core.simulate_batch(others, frames, 0.0))
+    if not (np.array_equal(beside[0], states) and np.array_equal(beside[2], states)):
+        told.append("bits of motions in lanes")
+    bars = np.asarray(core.vjp_batch(others, frames, np.stack([bar] * 3), 0.0))
+    if not (np.array_equal(bars[0], expected) and np.array_equal(bars[2], expected)):
+        told.append("bits of gradients in lanes")
+    return ", ".join(told)
+
+
 def gap(a: Array, b: Array) -> float:
     """The largest difference over the largest number, worst frame."""
     return max(float(np.abs(p - q).max() / max(np.abs(q).max(), 1e-9)) for p, q in zip(a, b, strict=True))
@@ -305,6 +356,8 @@ def main() -> None:
         try:
             drawing = drawn(seed)
             rng = np.random.default_rng([7, seed])
+            if said := same_bits(drawing, rng):
+                print(f"{seed}: {said} [{drawing.told}]", flush=True)
             for k in range(3):
                 said = judged(derivatives(drawing, rng), drawing.scene.particle_count)
                 key = "kink" if said == "kink" else "wrong" if said else "right"

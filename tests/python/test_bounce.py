@@ -100,6 +100,39 @@ def test_a_rope_that_falls_flat_bounces_as_a_ball_does(integrator):
     assert motion.positions[-1][:9, 2] == pytest.approx(expected, abs=2e-3 if integrator == "bdf1" else 2e-4)
 
 
+def landed(angle, restitution, method, h):
+    """Velocities (2, 2) in their plane of the ends of a rod that falls at 1 m/s, after one end has hit a table."""
+    ahead = np.array([np.cos(angle), 0.0, np.sin(angle)])
+    scene = sb.Scene("dumbbell", gravity=(0, 0, 0))
+    low = np.array([0.0, 0.0, 0.0100333])
+    ends = scene.add_particles([low, low + LENGTH * ahead], ENDS, [[0, 0, -1.0]] * 2)
+    scene.add_constraints("distance", [ends], name="rod", compliance=0.0)
+    scene.add_contact([ends[0]], sb.Plane(name="table"), friction=0.0, restitution=restitution)
+    sweeps = {"iterations": 50} if method == "gauss_seidel" else {}
+    motion = sb.simulate(scene, [0.0, 0.014 - h, 0.014], sb.Solver(h=h, method=method, integrator="bdf1", **sweeps))
+    return np.diff(motion.positions[1:, :, ::2], axis=0)[0] / h
+
+
+LENGTH, ENDS = 0.2, np.array([0.1, 0.05])
+
+
+@pytest.mark.parametrize("method", ["implicit", "gauss_seidel"])
+@pytest.mark.parametrize("angle", [0.0, 0.5, 1.0, np.pi / 2])
+def test_a_rod_that_lands_on_one_end_leaves_with_the_impulse_of_rigid_mechanics(angle, method):
+    """An impulse at the end with the effective mass there: 1/m_end = 1/m + (distance from the center . n)^2/inertia."""
+    whole, reduced = ENDS.sum(), ENDS.prod() / ENDS.sum()
+    inertia, arm = reduced * LENGTH**2, ENDS[1] / whole * LENGTH * np.cos(angle)
+    for restitution in (0.5, 1.0):
+        impulse = (1 + restitution) / (1 / whole + arm**2 / inertia)
+        center, spin = -1.0 + impulse / whole, impulse * arm / inertia
+        errors = []
+        for h in (1e-3, 1e-4):
+            v = landed(angle, restitution, method, h)
+            errors.append((abs(ENDS @ v[:, 1] / whole - center), abs(np.linalg.norm(v[1] - v[0]) / LENGTH - abs(spin))))
+        assert np.all(np.array(errors[1]) < (1e-3, 6e-3))
+        assert np.all(np.array(errors[1]) < 0.2 * np.array(errors[0]) + 1e-4)  # of first order
+
+
 def test_what_is_held_and_soft_does_not_bounce():
     with pytest.raises(sb.SceneError, match="held by constraints, and the contact has a stiffness") as error:
         _ = dropped_rope(0.006, stiffness=100.0).compiled

@@ -155,6 +155,55 @@ def test_the_last_ball_of_a_cradle_swings_as_one_alone_would(method: str, integr
     assert errors[1].max() < (5e-3 if order == 1 else 2e-4)
 
 
+def rods(joints: int, apart: float, compliance: float, restitution: float, pinned: bool = False) -> sb.Scene:
+    """A ball flies at 1 m/s against balls in a row that rods join, at rest; the last of them may be pinned."""
+    scene = sb.Scene("rods", gravity=(0, 0, 0))
+    ahead = np.array([np.cos(apart), 0.0, np.sin(apart)])
+    row = 0.1 * np.arange(joints + 1)[:, None] * ahead
+    balls = scene.add_particles([[-0.03, 0, 0], *row], 0.05, [[1.0, 0, 0], *[[0, 0, 0]] * (joints + 1)])
+    pairs = np.column_stack([balls[1:-1], balls[2:]])
+    scene.add_constraints("distance", pairs, name="rods", compliance=compliance)
+    if pinned:
+        scene.pin(balls[-1:])
+    scene.add_collisions(balls[:-1] if pinned else balls, radius=0.01, restitution=restitution)
+    return scene
+
+
+@pytest.mark.parametrize("integrator", ["bdf1", "bdf2"])
+@pytest.mark.parametrize("method", ["gauss_seidel", "implicit", "direct"])
+@pytest.mark.parametrize("apart", [0.0, 0.6, 1.2])
+def test_an_impact_moves_all_that_rigid_rods_join(apart: float, method: str, integrator: str):
+    """The end of a dumbbell has the inverse mass of its center, and more the farther it turns."""
+    more = {"iterations": 30} if method == "gauss_seidel" else {}
+    at_end = 0.5 / 0.05 + 0.5 / 0.05 * np.sin(apart) ** 2  # 1/kg: of the center, and with a lever of half the rod
+    for restitution in (0.5, 1.0):
+        impulse = (1 + restitution) / (1 / 0.05 + at_end)
+        errors = []
+        for h in (1e-3, 1e-4):
+            solver = sb.Solver(h=h, method=method, integrator=integrator, **more)
+            motion = sb.simulate(rods(1, apart, 0.0, restitution), [0.0, 0.02 - h, 0.02], solver)
+            ball, near, far = np.diff(motion.positions[1:], axis=0)[0] / h
+            assert motion.contacts["balls"].began == 1
+            found = [ball[0], (near[0] + far[0]) / 2, np.linalg.norm(far - near) / 0.1]
+            turning = impulse * 0.05 * np.sin(apart) / (0.05 * 0.1**2 / 2)
+            exact = [1 - impulse / 0.05, impulse / 0.1, turning]
+            errors.append(np.abs(np.array(found) - exact))
+        assert np.all(errors[1] < (1e-3, 1e-3, 2e-2)), (errors, exact)
+        assert np.all(errors[1] < 0.2 * errors[0] + 1e-4), (errors, exact)
+
+
+@pytest.mark.parametrize("method", ["implicit", "direct"])
+def test_an_impact_moves_a_row_of_stiff_rods_and_what_nothing_moves_throws_back(method: str):
+    solver = sb.Solver(h=1e-3, method=method)
+    for joints, compliance in ((4, 0.0), (4, 1e-9)):
+        motion = sb.simulate(rods(joints, 0.0, compliance, 1.0), [0.0, 0.03], solver)
+        v = motion.velocities[-1, :, 0]
+        assert v[0] == pytest.approx((1 - 5) / (1 + 5), abs=1e-3)
+        assert v[1:].mean() == pytest.approx(2 / (1 + 5), abs=1e-3)
+    motion = sb.simulate(rods(1, 0.0, 0.0, 0.8, pinned=True), [0.0, 0.03], solver)
+    assert motion.velocities[-1, :2, 0] == pytest.approx([-0.8, 0.0], abs=1e-6)
+
+
 def test_a_restitution_is_fitted_inside_its_interval():
     times = np.arange(0, 1.0001, 1 / 60)
     clean = sb.simulate(cradle(0.05, 0.75), times, SOLVER).positions

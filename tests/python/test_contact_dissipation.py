@@ -108,9 +108,9 @@ def test_a_file_keeps_it(tmp_path):
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"dissipation": -0.1}, "must not be negative"),
-        ({"dissipation": np.nan}, "must not be negative"),
-        ({"dissipation": "much"}, "must not be negative"),
+        ({"dissipation": -0.1}, "must be a number, not negative"),
+        ({"dissipation": np.nan}, "must be a number, not negative"),
+        ({"dissipation": "much"}, "must be a number, not negative"),
         ({"stiffness": None}, "give a stiffness"),
         ({"restitution": 0.5}, "leave out the dissipation"),
     ],

@@ -118,6 +118,8 @@ def test_what_is_no_solid_is_refused(ball: sb.DistanceField, tmp_path: Path):
         sb.DistanceField(mesh_of(whole.vertices, whole.triangles[:, ::-1]))
     with pytest.raises(sb.SceneError, match="grid points"):
         sb.DistanceField(whole, spacing=1e-5)
+    with pytest.raises(sb.SceneError, match="too coarse"):
+        sb.DistanceField(whole, spacing=20 * RADIUS)  # no grid point is inside: nothing would touch it
     with pytest.raises(sb.SceneError, match="must be positive"):
         sb.DistanceField(whole, margin=0.0)
     with pytest.raises(sb.SceneError, match="is no mesh"):

@@ -92,7 +92,7 @@ class ContactNumbers:
         needed = (("friction", self.friction, "a coefficient, or 0"), ("radius", self.radius, "m, or 0"))
         for label, value, unit in needed:
             if not (is_number(value) and value >= 0):
-                raise SceneError(f"{name}.contact.{label}", "must not be negative", value, f"give {unit}")
+                raise SceneError(f"{name}.contact.{label}", "must be a number, not negative", value, f"give {unit}")
         if self.stiffness is not None and not (is_number(self.stiffness) and self.stiffness > 0):
             fix = "give N/m, or leave it out for a rigid contact"
             raise SceneError(f"{name}.contact.stiffness", "must be positive", self.stiffness, fix)
@@ -104,7 +104,7 @@ class ContactNumbers:
         field = f"{name}.contact.dissipation"
         if not (is_number(self.dissipation) and self.dissipation >= 0):
             fix = "give s/m, 0 for an elastic contact, or leave it out"
-            raise SceneError(field, "must not be negative", self.dissipation, fix)
+            raise SceneError(field, "must be a number, not negative", self.dissipation, fix)
         if self.stiffness is None:
             raise SceneError(field, "is of a rigid contact", self.dissipation, "give a stiffness, N/m, too")
         if self.restitution is not None:

@@ -61,8 +61,8 @@ class DistanceField(Collider):
         margin: m, how far around the mesh the grid goes: contact radii must be smaller. Four cells by default.
 
     Raises:
-        SceneError: a mesh that is open or inside out, lengths that are not positive, or a grid of more than 16 million
-            points.
+        SceneError: a mesh that is open or inside out, lengths that are not positive, a grid of more than 16 million
+            points, or one too coarse for the mesh.
     """
 
     shape: ClassVar[str] = "distance_field"
@@ -137,12 +137,18 @@ def _sampled(label: str, mesh: TriangleMesh, spacing: float | None, margin: floa
     coefficients = np.pad(coefficients, 1, mode="reflect")
     corners = vertices[triangles]
     surface = np.concatenate([vertices, _spread(corners, SAMPLES)])
+    error, deepest = float(np.abs(spline(origin, step, coefficients, surface)).max()), float(-distances.min())
+    if error >= deepest:
+        problem = (
+            f"is too coarse: the surface is off by {error:.3g} m, and the deepest grid point is {deepest:.3g} m inside"
+        )
+        raise SceneError(f"{label}.spacing", problem, step, "give a smaller spacing, m")
     return DistanceGrid(
         origin,
         step,
         np.ascontiguousarray(coefficients),
-        deepest=float(-distances.min()),
-        error=float(np.abs(spline(origin, step, coefficients, surface)).max()),
+        deepest=deepest,
+        error=error,
         outline=_sections(corners),
         extent=float(np.linalg.norm(vertices, axis=1).max()),
     )

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import check_label, node_array, per_item
+from ..arrays.checks import check_kind, check_label, node_array, per_item
 from ..errors import SceneError
 from ..mesh.triangle_mesh import TriangleMesh
 from ..quantities.kinds import KINDS
@@ -300,6 +300,7 @@ class Scene(BlownScene):
                 of what is held and soft.
         """
         self._building()
+        check_kind("contact.settle", settle, bool, "give True or False", SceneError)
         numbers = ContactNumbers(friction, radius, stiffness, restitution, dissipation)
         own = points_of(what, points, name)
         which, name = self.contacts.check(own or what, collider, self.particle_count, numbers, name)
