@@ -66,6 +66,54 @@ def rope_in_hand(held: str, seconds: float = 2.5, stiffness: float = EI) -> sb.R
     return sb.Recording(noisy(x, 1), t, tuple(names), name=f"hand_{held}")
 
 
+FRICTION, STIFF, TABLE = 0.35, 6e-4, 0.75  # of a table, and m, how high it is; EI, N m^2, of the rope on it
+
+
+def rope_on_table(held: str, seconds: float = 3.0, flat: bool = False, noise: float = 1e-3) -> sb.Recording:
+    """A rope of 0.6 m on a table, in a hand that rests for 0.3 s and then drags it aside slowly and back fast.
+
+    Args:
+        held: "one" marker at the end, about which the rope turns; "body", three beside it in a hand that turns too.
+        flat: as a camera from above tracks it, in x and y.
+        noise: m.
+    """
+    rest, rate, length, links = 1.0, 50, 0.6, 96  # s, before the recording, in which the rope comes to rest; Hz; m
+    t = np.arange(round((rest + seconds) * rate) + 1) / rate
+    since = t - rest - 0.3
+
+    def moved(begin: float, lasts: float) -> Array:
+        share = np.clip((since - begin) / lasts, 0.0, 1.0)
+        return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+
+    slow, fast, last = moved(0.0, 0.9), moved(1.0, 0.5), moved(1.7, 0.9)
+    away, aside = -0.15 * fast - 0.1 * last, 0.15 * slow - 0.3 * fast + 0.15 * last
+    place = np.stack([away, aside, np.full_like(t, TABLE + 0.004)], axis=1)
+    angle = 0.0 * t if held == "one" else 0.6 * slow - 1.2 * fast + 0.9 * last
+    c, s, one, zero = np.cos(angle), np.sin(angle), np.ones_like(t), np.zeros_like(t)
+    turns = np.moveaxis(np.array([[c, -s, zero], [s, c, zero], [zero, zero, one]]), 2, 0)
+    way = 0.7 * np.sin(1.3 * np.pi * (np.arange(links) + 0.5) / links) * np.sin(1.3 * np.pi * np.arange(links) / links)
+    bends = length / links * np.stack([np.cos(way), np.sin(way), 0.0 * way], axis=1)
+    points = place[0] + np.concatenate([np.zeros((1, 3)), np.cumsum(bends, axis=0)])
+    grip = None if held == "one" else sb.Grip(t, place, turns @ np.array([1.0, 0, 0]), turns @ np.array([0, 1.0, 0]))
+    scene = sb.Scene("take")
+    own = {"length": length, "segments": links, "density": DENSITY, "EI": STIFF, "EA": 2e3, "drag_linear": 0.02}
+    rope = sb.add_rope(scene, **own, bend_damping=2e-3, points=points, grip_start=grip)
+    if grip is None:
+        scene.drive(rope.particles[:1], t, place[:, None])
+    table = sb.Plane(point=(0, 0, TABLE), name="table")
+    scene.add_contact(rope, table, friction=FRICTION, radius=0.004, stiffness=2e3)
+    solver = sb.Solver(h=2.5e-4, method="implicit", integrator="bdf1")
+    x = sb.simulate(scene, t, solver).positions[:, rope.particles[::8]]
+    names = [f"r{k}" for k in range(13)]
+    if held == "body":
+        of_hand = np.array([[-0.02, 0.03, 0.0], [-0.03, -0.03, 0.0], [-0.07, 0.0, 0.0]])
+        x = np.concatenate([place[:, None] + np.einsum("fab,kb->fka", turns, of_hand), x], axis=1)
+        names = ["a", "b", "c", *names]
+    x = x + noise * np.random.default_rng(1).standard_normal(x.shape)
+    x = np.where([True, True, not flat], x, 0.0)[t >= rest - 1e-9]
+    return sb.Recording(x, np.arange(len(x)) / rate, tuple(names), name=f"table_{held}")
+
+
 def let_go(clamped: bool, seconds: float = 1.5) -> sb.Recording:
     """A straight level rope that is let go, held in a clamp or by a pin."""
     t = np.arange(round(seconds * RATE) + 1) / RATE

@@ -341,9 +341,13 @@ class TestValues:
         text = ROPE.replace("[parameters.rope_bend_damping]", "[parameters.rope_bend_damping]\nprivate = true")
         study = load(written(folder, text))
         new = with_values(study.config, {"rope_EI": 3e-3, "rope_bend_damping[swing]": 0.05, "unheard_of": 1.0})
-        finer = with_finer(new, {"rope_EI": 1e-4})
+        finer = with_finer(new, {"rope_EI": 1e-4, "rope_bend_damping[swing]": -0.01})
         assert finer.parameters["rope_EI"].finer == pytest.approx(3.1e-3)
-        assert with_values(finer, {"rope_EI": 3e-3}).parameters["rope_EI"].finer is None  # of an earlier fit
+        write(finer, folder / "finer.toml", folder)
+        (e,) = load(folder / "finer.toml", finer=2).experiments
+        assert e.scene.quantities["rope_bend_damping"].value == pytest.approx(0.04)
+        again = with_values(finer, {"rope_EI": 3e-3})  # of an earlier fit
+        assert again.parameters["rope_EI"].finer is None and not again.recording[0].finer
         (folder / "deeper").mkdir()
         write(new, folder / "deeper" / "fitted.toml", folder)
         (e,) = load(folder / "deeper" / "fitted.toml").experiments

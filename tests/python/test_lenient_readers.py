@@ -238,10 +238,29 @@ def test_seconds_under_the_name_of_nanoseconds_are_refused(tmp_path: Path) -> No
         Recording.load(tmp_path / "bag.csv")
 
 
-def test_a_table_of_two_coordinates_is_told_what_it_lacks(tmp_path: Path) -> None:
-    (tmp_path / "flat.csv").write_text("t,a_x,a_y,b_x,b_y\n0,1,2,3,4\n")
-    with pytest.raises(RecordingError, match=r"only x and y of a marker.*a third column"):
+@pytest.mark.parametrize("header", ["a_x,a_y,b_x,b_y", "a x [mm],a y [mm],b x [mm],b y [mm]", "xa,ya,xb,yb"])
+def test_a_table_of_x_and_y_alone_lies_in_a_plane(tmp_path: Path, header: str) -> None:
+    """As one camera tracks it."""
+    (tmp_path / "flat.csv").write_text(f"t,{header}\n0,1,2,3,4\n1,,,5,6\n")
+    found = Recording.load(tmp_path / "flat.csv")
+    scale = 1e-3 if "mm" in header else 1.0
+    assert found.markers == ("a", "b")
+    assert found.positions[0].tolist() == [[scale, 2 * scale, 0.0], [3 * scale, 4 * scale, 0.0]]
+    assert found.mask.tolist() == [[True, True], [False, True]]
+
+
+def test_a_table_of_two_markers_in_a_plane_and_one_in_space(tmp_path: Path) -> None:
+    (tmp_path / "flat.csv").write_text("t,a_x,a_y,b_x,b_y,b_z\n0,1,2,3,4,5\n")
+    with pytest.raises(RecordingError, match=r"only x and y of a marker.*x and y of all"):
         Recording.load(tmp_path / "flat.csv")
+
+
+def test_a_voltage_is_not_in_inches(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("t,voltage_in\n0,1\n1,2\n")
+    with pytest.raises(RecordingError, match="does not say that it is a length"):
+        Recording.load(tmp_path / "log.csv")
+    (tmp_path / "log.csv").write_text("t,distance_in\n0,1\n1,2\n")
+    assert Recording.load(tmp_path / "log.csv").positions[1, 0, 2] == pytest.approx(2 * 0.0254)
 
 
 SHEET = (

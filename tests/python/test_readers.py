@@ -128,7 +128,7 @@ def test_long_csv_columns_go_by_name(tmp_path: Path) -> None:
         ("time a_x a_y a_z\n0 1 2 3\n", "line 1: must be a header"),
         ("# nothing\n\n", "holds no header"),
         ("time,a_x,a_y,a_z\n", "no rows"),
-        ("time,a_x,a_y\n0,1,2\n", "line 1: has only x and y of a marker"),
+        ("time,a_x,a_y,b_x,b_z\n0,1,2,3,4\n", "line 1: has only x and y of a marker"),
         ("time,a_x,a_z,a_y\n0,1,2,3\n", r"line 1: must have the column 'a_y' there \(got 'a_z'\)"),
         ("time,a,b,c\n0,1,2,3\n", r"line 1: must have the column 'a_x' there \(got 'a'\). Fix: name the columns"),
         ("time,a_x,a_y,a_z\n0,lost,lost,lost\n", r"line 2: holds a cell that is no number .*an empty cell or nan"),

@@ -367,6 +367,13 @@ def test_noise_is_found_under_motion(uneven: bool) -> None:
     assert Recording(clean, t).noise().max() < 0.01 * 4e-4
 
 
+def test_noise_counts_the_coordinates_that_are_measured() -> None:
+    """Of a camera that tracks a plane it was sqrt(2/3) of what it is."""
+    x = np.random.default_rng(5).normal(0.0, 1e-3, (400, 3, 3))
+    x[..., 2] = 0.7
+    assert np.allclose(Recording(x, np.arange(400) / 50).noise(), 1e-3, rtol=0.12)
+
+
 def test_noise_is_unknown_for_short_recordings() -> None:
     assert np.isnan(moving(frames=4).noise()).all()
     assert np.isnan(Recording(np.zeros((1, 2, 3)), [0.0]).noise()).all()

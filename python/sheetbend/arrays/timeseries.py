@@ -120,20 +120,22 @@ def noise(times: Array, positions: Array) -> Array:
         positions: (frames, markers, 3) m, NaN = not seen.
 
     Returns:
-        (markers,) m: root mean square over x, y, z of the deviation of one coordinate; NaN for a marker
-        that has fewer than 8 runs of five frames seen in a row.
+        (markers,) m: root mean square of the deviation of one coordinate, over those in which a marker moves (a camera
+        that tracks a plane leaves one constant); NaN for a marker that has fewer than 8 runs of five frames in a row.
     """
     markers = positions.shape[1]
     if len(times) - 4 < _FEWEST_WINDOWS:
         return np.full(markers, np.nan)
     residual = off_neighbors(times, positions)
+    moves = (np.fmax.reduce(positions, axis=0) > np.fmin.reduce(positions, axis=0)).any(axis=0)
+    count = max(1, int(moves.sum()))
     deviation = np.full(markers, np.nan)
     for marker in range(markers):
         size = np.abs(residual[:, marker])
         size = size[~np.isnan(size[:, 0])]
         if len(size) >= _FEWEST_WINDOWS:
             per_axis = _MAD_TO_STANDARD_DEVIATION * np.median(size, axis=0)
-            deviation[marker] = np.sqrt(np.mean(per_axis**2))
+            deviation[marker] = np.sqrt(np.sum(per_axis**2) / count)
     return deviation
 
 

@@ -18,7 +18,7 @@ from .schema import RecordingSection
 
 TAKEN = (
     {"file", "cloud", "mend", "name", "frames", "hidden", "fit", "held_out"}  # the recording
-    | {"ropes", "leave_out", "tools", "values", "force", "max_gap", "driven_motion"}  # its scene
+    | {"ropes", "leave_out", "tools", "values", "finer", "force", "max_gap", "driven_motion"}  # its scene
     | {"marker", "here", "grids", "offsets"}  # the places of its markers
 )
 """Keys of [[recording]] that the configuration itself turns into something. Every other goes under its own name to the

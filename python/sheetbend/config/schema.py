@@ -195,6 +195,9 @@ class RecordingSection(Section):
     values: dict[str, Finite] = key(
         {}, "quantities whose value is known to differ here; for private parameters the initial value"
     )
+    finer: dict[str, Finite] = key(
+        {}, "values of private parameters on twice the segments or cells, as `finer` of [parameters.NAME] is of others"
+    )
 
     @model_validator(mode="after")
     def _estimated_by_a_fit(self) -> Self:

@@ -87,7 +87,8 @@ def at_finer_values(config: schema.Config) -> schema.Config:
         name: p if p.finer is None else p.model_copy(update={"initial": p.finer})
         for name, p in config.parameters.items()
     }
-    return config.model_copy(update={"parameters": parameters})
+    recordings = [r.model_copy(update={"values": {**r.values, **r.finer}}) for r in config.recording]
+    return config.model_copy(update={"parameters": parameters, "recording": recordings})
 
 
 def fields_of_parameter(section: schema.ParameterSection) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..files.whole import write_text
 from ..optional import require
-from .schema import Config, ParameterSection
+from .schema import Config, ParameterSection, RecordingSection
 
 
 def with_values(config: Config, values: Mapping[str, float]) -> Config:
@@ -21,7 +21,7 @@ def with_values(config: Config, values: Mapping[str, float]) -> Config:
     `values`.
     """
     parameters = dict(config.parameters)
-    recordings = list(config.recording)
+    recordings = [r.model_copy(update={"finer": {}}) if r.finer else r for r in config.recording]
     wind = config.scene.unknown_wind
     fields = {*config.smooth, *(force.name for force in config.scene.unknown_force), *([wind.name] if wind else [])}
     names = [r.name or Path(r.file).stem for r in recordings]
@@ -54,7 +54,19 @@ def with_finer(config: Config, moved: Mapping[str, float]) -> Config:
         if name in moved and section.initial is not None and section.tied_to is None and math.isfinite(moved[name]):
             finer = _inside(section, section.initial + moved[name])
             parameters[name] = section.model_copy(update={"finer": finer})
-    return config.model_copy(update={"parameters": parameters})
+    recordings = [_private_finer(config, r, moved) for r in config.recording]
+    return config.model_copy(update={"parameters": parameters, "recording": recordings})
+
+
+def _private_finer(config: Config, recording: RecordingSection, moved: Mapping[str, float]) -> RecordingSection:
+    """A recording with the values of its private parameters there."""
+    name = recording.name or Path(recording.file).stem
+    finer = {
+        base: _inside(config.parameters[base], value + moved[f"{base}[{name}]"])
+        for base, value in recording.values.items()
+        if base in config.parameters and math.isfinite(moved.get(f"{base}[{name}]", math.nan))
+    }
+    return recording.model_copy(update={"finer": finer}) if finer else recording
 
 
 def write(config: Config, path: Path, folder: Path) -> None:

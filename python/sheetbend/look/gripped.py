@@ -8,6 +8,7 @@ from typing import Any
 
 from ..errors import RecordingError
 from .held import between_grips, gripping, parts
+from .lying import table_under
 from .take import Description, Measured, Take
 from .text import joined, table
 
@@ -15,7 +16,8 @@ from .text import joined, table
 def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     """A rope whose ends are held by two or more markers each; None for other recordings."""
     s = takes[0].seen
-    if s.static or not between_grips(s):
+    _, order = parts(s)
+    if s.static or not between_grips(s) or table_under(s, order) is not None:
         return None
     r = s.recording
     paths = [PurePosixPath(take.file) for take in takes]
@@ -26,7 +28,6 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         raise RecordingError(
             "files", "of one rope between two grips lie in several folders", joined(map(str, paths)), fix
         )
-    _, order = parts(s)
     clamped = sorted(gripping(s) & set(order))
     notes = [
         f"a rope through {joined(r.markers[k] for k in order)}, held at both ends: "

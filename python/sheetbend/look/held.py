@@ -18,6 +18,7 @@ from .text import joined
 Array = np.ndarray
 NAMES = ("hand", "grip", "wrist", "clamp", "vise", "fixture", "robot", "holder", "finger")
 SMOOTHING, ALONE = 0.06, 0.12  # s, of recorded grips; of one that has one marker
+DRAGS = 0.2  # s, of a hand that drags a rope over a table: friction keeps how its noise turns the rope
 STIFF = 0.75  # of the next chord's: how much the direction at an end varies at most in a clamp; a pin has 1 or more
 NEAR = 1.5  # times the distance of neighbors on the rope: how near its first marker is to the second
 AWAY = 4.0  # times the distance of neighbors on the rope: a rigid body so far from all of them is not on it
@@ -143,18 +144,18 @@ def gripping(s: Seen) -> set[int]:
     return named(s) | set(s.recording.clamped)
 
 
-def held(s: Seen, hands: Hands, order: tuple[int, ...]) -> Held:
-    """What holds a rope that moves, whose markers are given in order."""
+def held(s: Seen, hands: Hands, order: tuple[int, ...], lies: bool = False) -> Held:
+    """What holds a rope that moves, or is moved over a table, whose markers are given in order."""
     still, clamped = set(s.still), gripping(s)
     found = Held(order)
     ends = {"start": order[0], "end": order[-1]}
     taken = [at for at, k in ends.items() if k in still or k in clamped]
     by_hand: list[str] = []
     for hand in hands:
-        by_hand.append(_of_hand(s, hand, found, by_hand))
+        by_hand.append(_of_hand(s, hand, found, by_hand, lies))
     taken = [at for at in taken if at not in by_hand]
     if not taken and not by_hand:
-        taken = [_guessed(s, found)]
+        taken = [_guessed(s, found, lies)]
     for at in taken:
         way = order if at == "start" else order[::-1]
         if way[0] in still:
@@ -259,7 +260,7 @@ def _clamp_angles(s: Seen, found: Held) -> None:
         found.unknown.append(f"the exact direction of the clamp, which the first markers show poorly: {kept}")
 
 
-def _of_hand(s: Seen, hand: tuple[int, ...], found: Held, held_before: Sequence[str]) -> str:
+def _of_hand(s: Seen, hand: tuple[int, ...], found: Held, held_before: Sequence[str], lies: bool) -> str:
     """Add the grip of a hand's body; returns the end that it holds, which none held before."""
     r, order = s.recording, found.order
     x = r.positions[r.mask[:, list(hand)].any(axis=1)]
@@ -270,7 +271,8 @@ def _of_hand(s: Seen, hand: tuple[int, ...], found: Held, held_before: Sequence[
         at, k = ("end", order[-1]) if at == "start" else ("start", order[0])
     name, all_of = r.markers[k], joined(r.markers[j] for j in hand)
     how = "stay in place, on a body" if set(hand) <= set(s.still) else "move as one rigid body,"
-    where = entry(s, hand, order if at == "start" else order[::-1])
+    way = order if at == "start" else order[::-1]
+    where = entry(s, hand, way[:1] if lies else way)  # a lead is told by a rope that hangs
     grip: dict[str, Any] = {"at": at, "markers": [r.markers[j] for j in hand], "position": where.place}
     if where.lead:
         found.notes.append(f"{all_of} {how} which holds the rope some {where.lead:.2g} m from {name}")
@@ -288,14 +290,18 @@ def _of_hand(s: Seen, hand: tuple[int, ...], found: Held, held_before: Sequence[
         found.notes.append(f"{all_of} {how} which holds the rope near {name}")
         found.unknown.append(
             f"in which direction the rope leaves the hand, and where: that of its first markers, at {name}"
+            + (f". The direction is fitted (`tilts`). Put {name} where the hand ends" if lies else "")
         )
-    found.grips.append(grip | {"smoothing": SMOOTHING})
+    if lies:
+        found.rope["tilts"] = True
+        found.priors |= {f"{at}_tilt_{j}": TILT_SD for j in (1, 2)}
+    found.grips.append(grip | {"smoothing": DRAGS if lies else SMOOTHING})
     return at
 
 
-def _guessed(s: Seen, found: Held) -> str:
+def _guessed(s: Seen, found: Held, lies: bool) -> str:
     """The end that is taken as the held one where none stays: the one that moves first, the upper one, or the one that
-    moves less."""
+    moves less; on a table the one that moves more."""
     r, (first, last) = s.recording, (found.order[0], found.order[-1])
     starts = [_leaves(s, k) for k in (first, last)]
     height = mean_position(r.positions) @ (-s.gravity / np.linalg.norm(s.gravity))
@@ -315,13 +321,15 @@ def _guessed(s: Seen, found: Held) -> str:
     if abs(rise) > HIGHER * float(s.apart[first, last]):
         at, why = ("start" if rise > 0 else "end"), "the upper end"
     else:
-        at, why = ("start" if spread[first] < spread[last] else "end"), "the end that moves less"
+        less = "start" if spread[first] < spread[last] else "end"
+        more = "end" if less == "start" else "start"
+        at, why = (more, "the end that moves more") if lies else (less, "the end that moves less")
     k = first if at == "start" else last
     found.unknown.append(
         f"what holds the rope: no marker stays or has a name such as hand or grip, so {r.markers[k]}, {why}, is taken"
     )
     other = last if k == first else first
-    if spread[k] < BEYOND**2 * spread[other]:
+    if spread[k] < BEYOND**2 * spread[other] and not lies:
         share = np.sqrt(spread[k] / spread[other])
         found.unknown.append(
             f"what holds the rope beyond {r.markers[k]}, which moves by only {share:.0%} of what {r.markers[other]} "

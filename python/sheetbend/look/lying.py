@@ -2,24 +2,67 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import NamedTuple
+
 import numpy as np
 
+from .end_load import feels_gravity
+from .line import plane
 from .seen import Seen
 
+Array = np.ndarray
 BAND = 0.01  # of the length: how high above the lowest markers counts as lying, and six times the noise at least
 SHARE = 0.6  # of all that is seen, so low
 SLIDES = 3.0  # times this band: how far markers move along the floor
+FALLS = 0.5  # of gravity: so much the outer half of a rope in the air shows at least
+RADIUS = 0.005  # m, taken as the rope's
 
 
-def lies(s: Seen, order: tuple[int, ...]) -> bool:
-    """Whether most of a rope that moves stays at one height, as on a floor, and none of its ends stays in place."""
+class Table(NamedTuple):
+    """What a rope lies on.
+
+    Attributes:
+        seen: the recording, with the axis that is up.
+        up: (3,) unit vector.
+        height: m along it, of the markers that lie.
+    """
+
+    seen: Seen
+    up: Array
+    height: float
+
+    @property
+    def point(self) -> list[float]:
+        """m, on its surface, a radius below the markers that lie."""
+        return [float(v) for v in (self.height - RADIUS) * self.up + 0.0]
+
+
+def table_under(s: Seen, order: tuple[int, ...]) -> Table | None:
+    """What a rope that moves lies on, where most of it stays at one height, and none of its ends stays in place. Where
+    nobody tells which way is up, this may be across the plane that it moves in, as a camera from above shows it."""
     if s.static or {order[0], order[-1]} & set(s.still):
-        return False
+        return None
+    return _table(s, order) or _table(_from_above(s, order), order)
+
+
+def _table(s: Seen, order: tuple[int, ...]) -> Table | None:
     x = s.recording.positions[:, list(order)]
-    up = -s.gravity / np.linalg.norm(s.gravity)
+    up = 0.0 - s.gravity / np.linalg.norm(s.gravity)
     height = x @ up
     band = max(6.0 * s.noise, BAND * float(s.apart[np.ix_(order, order)].max()))
     low = height < np.nanquantile(height, 0.05) + band
     level = x - height[..., None] * up
     moved = float(np.sqrt(np.nanmean(np.nanvar(level, axis=0).sum(axis=1))))
-    return bool(low.sum() > SHARE * np.isfinite(height).sum() and moved > SLIDES * band)
+    lies = low.sum() > SHARE * np.isfinite(height).sum() and moved > SLIDES * band
+    return Table(s, up, float(np.median(height[low]))) if lies else None
+
+
+def _from_above(s: Seen, order: tuple[int, ...]) -> Seen:
+    """The same seen from above, where nothing tells which way is up and the rope moves in one plane without falling."""
+    x = s.recording.positions[:, list(order)]
+    normal = plane(x, float(s.apart[np.ix_(order, order)].max()))
+    if s.up_by != "guess" or normal is None or 1.0 not in normal or normal[s.up]:
+        return s
+    falls = max(feels_gravity(s, order), feels_gravity(s, order[::-1]))
+    return s if falls > FALLS else replace(s, up=normal.index(1.0))

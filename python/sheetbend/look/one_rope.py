@@ -1,10 +1,9 @@
-"""Whether markers in order along a line are those of one rope that hangs in the air."""
+"""Whether markers in order along a line are those of one rope."""
 
 from __future__ import annotations
 
 from ..errors import RecordingError
 from .line import forks
-from .lying import lies
 from .seen import Seen
 from .text import joined
 
@@ -12,22 +11,11 @@ BRANCHED = 1.1  # times the shortest tree: how much longer the line through all 
 
 
 def check_one_rope(s: Seen, order: tuple[int, ...]) -> None:
-    """Refuse what is no rope in the air.
+    """Refuse markers of a branched cable: their shortest tree forks, and is much shorter than any line through them.
 
     Raises:
-        RecordingError: the markers are those of a cable that branches, or of a rope on a floor.
+        RecordingError: the markers are those of a cable that branches.
     """
-    _unbranched(s, order)
-    if lies(s, order):
-        fix = (
-            "take the configuration in docs/tutorials/dragged_rope.md, with a table and its friction, for your markers"
-        )
-        got = joined(s.recording.markers[k] for k in order)
-        raise RecordingError("markers", "slide along at one height, as a rope on a floor or a table does", got, fix)
-
-
-def _unbranched(s: Seen, order: tuple[int, ...]) -> None:
-    """Refuse markers of a branched cable: their shortest tree forks, and is much shorter than any line through them."""
     at, longer = forks(s.apart, order)
     if at and longer > BRANCHED:
         raise RecordingError(

@@ -14,6 +14,7 @@ from .end_load import free_end
 from .falls import falls_upward
 from .held import Hands, Held, held, parts
 from .line import snapped, tangent
+from .lying import table_under
 from .marked import marked_by
 from .one_rope import check_one_rope
 from .released import released
@@ -44,15 +45,18 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     if not s.static and len(takes) == 1 and (let_go := released(s, order)) is not None:
         return _while_held(takes[0], measured, let_go)
     check_one_rope(s, order)
+    table = table_under(s, order)
+    if table is not None and table.seen.up != s.up:
+        return describe([replace(take, seen=replace(take.seen, up=table.seen.up)) for take in takes], measured)
     hanging = measured.weight is not None
 
     def holding(s: Seen, hands: Hands, order: tuple[int, ...]) -> Held:
-        return _at_rest(s, order, hanging) if s.static else held(s, hands, order)
+        return _at_rest(s, order, hanging) if s.static else held(s, hands, order, lies=table is not None)
 
     found = holding(s, hands, order)
     if len(found.order) < 3:
         return None
-    if s.up_by == "guess" and not s.static and (_stands(s, found) or (_flies(s, found) and falls_upward(s, order))):
+    if s.up_by == "guess" and table is None and not s.static and _upside_down(s, found, order):
         turned = describe([replace(take, seen=take.seen.upside_down()) for take in takes], measured)
         up = "xyz"[s.up]
         stands = f"with {up} up, it would stand on what holds it or fall upward: give --up {up} if it stands there"
@@ -65,10 +69,15 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         if free is not None:
             takes, pushed = [free.take], free.said
             found.unknown.append(free.unknown)
-    rope = model_of(marked_by(takes, found, holding), order, measured, pushed)
-    kind = "a rope at rest" if s.static else "a rope"
+    rope = model_of(marked_by(takes, found, holding), order, measured, pushed, table)
+    kind = "a rope at rest" if s.static else "a rope on a table" if table is not None else "a rope"
     driving = tuple(name for here in rope.marked for grip in here.held.grips for name in grip["markers"])
-    return Description(kind, notes_of(rope), unknown_of(rope), lines_of(rope), driving=driving)
+    up = "xyz"[s.up] if table is not None and s.up_by == "guess" else None
+    return Description(kind, notes_of(rope), unknown_of(rope), lines_of(rope), up, driving)
+
+
+def _upside_down(s: Seen, found: Held, order: tuple[int, ...]) -> bool:
+    return _stands(s, found) or (_flies(s, found) and falls_upward(s, order))
 
 
 def _stands(s: Seen, found: Held) -> bool:

@@ -14,6 +14,7 @@ from .beginning import lets_go
 from .end_load import free_end, loaded_end
 from .held import Held
 from .line import plane, snapped
+from .lying import Table
 from .marked import Marked
 from .seen import Seen
 from .take import Measured, Take
@@ -65,6 +66,7 @@ class RopeModel:
         estimated: whether the fit estimates the true motion of what moves it.
         load: at its free end.
         weighed: whether it was told what hangs there, if only nothing.
+        table: that it lies on.
     """
 
     marked: Sequence[Marked]
@@ -78,11 +80,13 @@ class RopeModel:
     estimated: bool
     load: Load | None
     weighed: bool
+    table: Table | None = None
 
     @property
     def hangs_unknown(self) -> bool:
         """Whether nothing tells if a mass hangs at its free end: a stiff rope's motion alone does not."""
-        return not self.weighed and self.load is None and not self.seen.static and free_end(self.held) is not None
+        hangs = not self.seen.static and self.table is None and free_end(self.held) is not None
+        return hangs and not self.weighed and self.load is None
 
     @property
     def seen(self) -> Seen:
@@ -105,7 +109,9 @@ class RopeModel:
         return self.rod and turns_freely(self.held) and not self.held.rope.get("pinned")
 
 
-def model_of(marked: Sequence[Marked], order: tuple[int, ...], measured: Measured, pushed: str | None) -> RopeModel:
+def model_of(
+    marked: Sequence[Marked], order: tuple[int, ...], measured: Measured, pushed: str | None, table: Table | None
+) -> RopeModel:
     """The model of a rope.
 
     Args:
@@ -113,15 +119,16 @@ def model_of(marked: Sequence[Marked], order: tuple[int, ...], measured: Measure
         order: its markers in the first one, those that hold it too.
         measured: beside the recordings.
         pushed: what is said of how it begins, where something pushed it.
+        table: that it lies on.
     """
     takes, found = [own.take for own in marked], marked[0].held
     s = takes[0].seen
     length = _length(s, max(marked, key=lambda own: float(own.arcs[-1])), measured)
     density = _density(s, measured)
     normal = plane(s.recording.positions[:, list(order)], length.value)
-    in_space = not s.static and normal is None and "plane" not in found.rope
+    in_space = not s.static and table is None and normal is None and "plane" not in found.rope
     rod = in_space and _can_be_rod(s, found)
-    start = Start({"points": "recording"}, []) if s.static else _start(s, found, rod)
+    start = Start({"points": "recording"}, []) if s.static else _laid(s, found) if table else _start(s, found, rod)
     return RopeModel(
         marked,
         [s.recording.markers[k] for k in order],
@@ -132,19 +139,20 @@ def model_of(marked: Sequence[Marked], order: tuple[int, ...], measured: Measure
         rod=rod,
         start=start if pushed is None else start._replace(said=[pushed]),
         estimated=rod and _estimates_hand(takes, found),
-        load=_load(s, found, density.value, measured.weight),
+        load=_load(s, found, density.value, measured.weight, lies=table is not None),
         weighed=measured.weight is not None,
+        table=table,
     )
 
 
-def _load(s: Seen, found: Held, density: float, weight: float | None) -> Load | None:
-    """What hangs at the free end: as weighed, or as the motion shows it."""
+def _load(s: Seen, found: Held, density: float, weight: float | None, lies: bool) -> Load | None:
+    """What hangs at the free end: as weighed, or as the motion of a rope in the air shows it."""
     if weight is not None:
         at = free_end(found)
         if at is None:
             raise RecordingError("weight", "hangs at a free end, and both ends are held", weight, "leave it out")
         return Load(at, weight, weight / density, weighed=True) if weight else None
-    load = None if s.static else loaded_end(s, found)
+    load = None if s.static or lies else loaded_end(s, found)
     return None if load is None else Load(load[0], load[1] * density, load[1])
 
 
@@ -220,6 +228,18 @@ def _start(s: Seen, found: Held, rod: bool) -> Start:
     first = mean_position(s.recording.positions)[found.order[0]].tolist()
     said.append("at the first frame it is straight within its noise")
     return Start({"start": first, "direction": way}, said)
+
+
+def _laid(s: Seen, found: Held) -> Start:
+    """How the motion of a rope on a table begins. Friction keeps what noise adds to its shape, so places at rest are
+    averaged."""
+    if not s.rest:
+        said = ["it moves at the first frame: place and speed at the start are those of the markers"]
+        return Start({"points": "recording", "velocity": "recording"}, said)
+    said, way = f"it rests for the first {s.rest:.2g} s", _straight(s, found.order)
+    if way is not None:
+        return Start({"direction": way}, [f"{said}, straight"])
+    return Start({"points": "recording", "velocity": "recording", "smoothing": round(s.rest, 4)}, [said])
 
 
 def _straight(s: Seen, order: tuple[int, ...]) -> list[float] | None:

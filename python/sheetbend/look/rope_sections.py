@@ -9,6 +9,7 @@ import numpy as np
 from .beginning import quiet_frame
 from .held import Held
 from .line import snapped
+from .lying import RADIUS
 from .marked import Marked
 from .rope_model import LEAST_SIGMA, ROUND, RopeModel, last_fitted
 from .seen import Seen
@@ -18,6 +19,7 @@ from .text import table
 SUBSTEP = 1 / 500  # s, at most
 BENDING = 0.15  # of the length: bending length (EI/(density g))^(1/3) at the start
 SEGMENTS, MOST_SEGMENTS = 40, 100  # of a rope, at least and at most
+FRICTION = 0.1  # on a table, at the start: a rope that sticks shows a fit no way
 CLAMP_SD = 0.2  # rad, of the direction of a clamp, read off the first markers
 LENGTH_SD = 0.01  # relative, of a length that is a sum of distances between markers
 SET_MODES, SET_SD = (1, 2, 3, 4), 10.0  # of the rest curvature of shapes at rest; 1/m, that of mode k over k^1.5
@@ -35,12 +37,19 @@ def _scene(rope: RopeModel) -> list[str]:
     lines = rope.marked[0].take.scene_lines
     if not rope.seen.static:
         step = float(np.median(np.diff(r.times)))
-        lines += table("[solver]", {"substeps": max(1, int(np.ceil(step / SUBSTEP - 1e-9)))}, {"substeps": "per frame"})
+        solver: dict[str, Any] = {"substeps": max(1, int(np.ceil(step / SUBSTEP - 1e-9)))}
+        solver |= {"method": "implicit", "integrator": "bdf1"} if rope.table is not None else {}
+        lines += table("[solver]", solver, {"substeps": "per frame"})
     lines += table(f"[[scene.{rope.kind}]]", _rope(rope), _why(rope))
     lines += table(f"[scene.{rope.kind}.markers]  # arc lengths in m", rope.marked[0].placed(rope.length.value))
     if rope.load is not None:
         point = {"name": "end", "particle": f"rope:{rope.load.at}", "mass": rope.load.mass}
         lines += table("[[scene.point_mass]]", point, {"mass": "kg"})
+    if (under := rope.table) is not None:
+        shape = {"name": "table", "shape": "plane", "point": under.point, "normal": under.up.tolist()}
+        touch = {"of": "rope", "collider": "table", "friction": FRICTION, "radius": RADIUS, "settle": True}
+        lines += table("[[scene.collider]]", shape, {"point": "m, below the lowest markers by a radius"})
+        lines += table("[[scene.contact]]", touch, {"friction": "a guess to start from", "radius": "m, not known"})
     for grip in rope.held.grips:
         lines += table(f"[[scene.{rope.kind}.grip]]", grip | ({"smoothing": 0.0} if rope.estimated else {}))
     return lines
@@ -55,7 +64,7 @@ def _rope(rope: RopeModel) -> dict[str, Any]:
     if rope.flat is not None:
         keys |= {"clamp_angles": True, "plane": rope.flat, "set_modes": list(SET_MODES)}
     if not rope.seen.static:
-        keys |= {"bend_damping": 0.01, "drag_linear": 0.1 * density}
+        keys |= {"bend_damping": None if rope.table else 0.01, "drag_linear": 0.1 * density}
     if rope.rod:
         keys |= {"GJ": ROUND * EI, "twist_damping": keys["bend_damping"]}
     if rope.keeps_roll:
@@ -77,8 +86,10 @@ def _why(rope: RopeModel) -> dict[str, str]:
 
 
 def _segments(rope: RopeModel) -> int:
-    """Twice as many where a hand holds the direction: beside it, a rope bends within a few hundredths of its length."""
-    least = 2 * SEGMENTS if any(len(grip["markers"]) > 1 for grip in rope.held.grips) else SEGMENTS
+    """Twice as many where a hand holds the direction: beside it, a rope in the air bends within a few hundredths of its
+    length."""
+    held = rope.table is None and any(len(grip["markers"]) > 1 for grip in rope.held.grips)
+    least = 2 * SEGMENTS if held else SEGMENTS
     return min(max(least, 2 * (len(rope.markers) - 1)), MOST_SEGMENTS)
 
 
@@ -124,11 +135,18 @@ def _entries(rope: RopeModel, take: Take) -> dict[str, Any]:
         axes = "".join(axis for k, axis in enumerate("xyz") if flat is None or abs(flat[k]) < 0.99)
         return entries | {"static": True, "sigma": max(s.noise, 0.007 * float(np.nanmax(s.apart))), "axes": axes}
     start, stop, last = float(r.times[0]), float(r.times[-1]), last_fitted(take)
-    if s.rest and "points" in rope.start.keys:
+    if s.rest and rope.table is not None:
+        start += 0.5 * s.rest
+    elif s.rest and "points" in rope.start.keys:
         entries["start"] = "equilibrium"
     entries["fit"] = [start, last]
     entries["held_out"] = [last, round(min(stop, last + 0.5 * (last - start)), 4) + 1e-3]
-    return entries | {"sigma": max(s.noise, LEAST_SIGMA)}
+    moves = "".join(
+        axis
+        for axis, size in zip("xyz", np.nanmax(r.positions, (0, 1)) - np.nanmin(r.positions, (0, 1)), strict=True)
+        if size
+    )
+    return entries | {"sigma": max(s.noise, LEAST_SIGMA), "axes": None if moves == "xyz" else moves}
 
 
 def _parameters(rope: RopeModel) -> list[str]:
@@ -157,8 +175,11 @@ def _limits(rope: RopeModel) -> dict[str, dict[str, Any]]:
     scale = density * 9.81 * rope.length.value**3
     found: dict[str, dict[str, Any]] = {"rope_EI": {"lower": 1e-7 * scale, "upper": 10.0 * scale}}
     if not rope.seen.static:
-        found["rope_bend_damping"] = {"lower": 1e-5, "upper": 1.0}
+        if rope.table is None:
+            found["rope_bend_damping"] = {"lower": 1e-5, "upper": 1.0}
         found["rope_drag_linear"] = {"lower": 1e-4 * density, "upper": 10.0 * density}
+    if rope.table is not None:
+        found["table_friction"] = {"lower": 0.01, "upper": 2.0}
     if rope.rod:
         found["rope_GJ"] = {"tied_to": "rope_EI", "factor": ROUND}
         found["rope_twist_damping"] = {"tied_to": "rope_bend_damping"}

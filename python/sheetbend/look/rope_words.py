@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..quantities.wording import short
 from .held import Held
+from .lying import RADIUS
 from .marked import said_of
 from .rope_model import ROUND, RopeModel
 from .text import joined
@@ -38,6 +39,16 @@ STIFF = (
 )
 
 
+ON_TABLE = (
+    f"the radius of the rope: {1e3 * RADIUS:g} mm is taken. Only the height of the table plus the radius counts, and "
+    "the markers show it",
+    "the friction apart from the drag, if all slides at one speed: drag it slowly and fast. If nothing slides, the "
+    "motion shows only the least friction (docs/tutorials/dragged_rope.md)",
+    "the damping of bending: friction hides it, so the model has none",
+    "whether the table is level. It is taken to be; a tilt of 1 degree changes the friction by up to 10 %",
+)
+
+
 def notes_of(rope: RopeModel) -> list[str]:
     """What is seen."""
     through, s = joined(rope.markers), rope.seen
@@ -47,6 +58,11 @@ def notes_of(rope: RopeModel) -> list[str]:
         if s.static
         else f"a rope through {through}; {far} of it are free"
     ]
+    if rope.table is not None:
+        height = short(rope.table.height)
+        said.append(
+            f"it lies at one height, {height} m, as on a table: the table is a plane, and its friction is fitted"
+        )
     said += rope.start.said
     if rope.load is not None:
         meters = f"{rope.load.meters:.2g}"
@@ -66,6 +82,8 @@ def unknown_of(rope: RopeModel) -> list[str]:
         said.append(TWIST if rope.rod else WITHOUT_TWIST)
     if rope.keeps_roll:
         said.append(SPIN)
+    if rope.table is not None:
+        said += ON_TABLE
     if rope.load is not None:
         said.append(WEIGHED if rope.load.weighed else LOAD)
     elif rope.hangs_unknown:

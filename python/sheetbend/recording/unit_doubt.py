@@ -27,9 +27,10 @@ def unit_words(recording: Recording, unit: str, why: str) -> str:
     """
     size = extent(recording) / METERS[unit]
     others = ", ".join(f"in {other} {short(size * METERS[other], 3)} m" for other in METERS if other != unit)
+    flat = (np.nanmax(recording.positions, axis=(0, 1)) == np.nanmin(recording.positions, axis=(0, 1))).any()
     return (
         f"lengths are taken as {unit}, {why}. The markers then move within {short(size * METERS[unit], 3)} m ({others})"
-        ". If another unit is right, begin again with --units"
+        f". If another unit is right, begin again with --units{'. Scale pixels to m first' if flat else ''}"
     )
 
 

@@ -41,7 +41,8 @@ def beside(name: str) -> bool:
 
 
 def markers(path: Path, line: int, names: Sequence[str]) -> tuple[list[str], str | None]:
-    """The markers whose x, y, z stand in columns of these names, and their length unit where the names tell it.
+    """The markers whose x, y, z stand in columns of these names, or whose x, y as a camera sees them, and their length
+    unit where the names tell it.
 
     Raises:
         RecordingError: three columns in a row are not x, y, z of one marker, or the units differ.
@@ -54,15 +55,19 @@ def markers(path: Path, line: int, names: Sequence[str]) -> tuple[list[str], str
     if len(told) > 1:
         got = sorted("none" if unit is None else unit for unit in told)
         refuse(path, line, "must name one length unit in all columns", got, "write it in every column, or in none")
+    bare = [name for name, _ in pairs]
+    unit = told.pop() if told else None
+    if None not in (in_plane := [_marker_of(bare[k : k + 2], 2) for k in range(0, len(bare), 2)]):
+        return [marker for marker in in_plane if marker is not None], unit
     found = []
-    for k in range(0, len(pairs), 3):
-        three = [name for name, _ in pairs[k : k + 3]]
-        marker = next((one for way in _WAYS if (one := _marker(way, three)) is not None), None)
+    for k in range(0, len(bare), 3):
+        three = bare[k : k + 3]
+        marker = _marker_of(three, 3)
         if marker is None:
             _refuse_three(path, line, three)
         match = _OF_ROS.fullmatch(three[0]) if len(three[0]) <= _LONGEST else None
         found.append(match[1] if match else marker)
-    return found, told.pop() if told else None
+    return found, unit
 
 
 def alone(path: Path, line: int, name: str) -> tuple[str, int, str | None]:
@@ -75,7 +80,10 @@ def alone(path: Path, line: int, name: str) -> tuple[str, int, str | None]:
     match = _ALONE.fullmatch(name) if len(name) <= _LONGEST else None
     bare, unit = (match[1].strip(), match[2] or match[3]) if match else (name, None)
     along = next((found for way in _WAYS if (found := way.fullmatch(bare))), None)
-    if unit is None and along is None and not _LENGTHS.fullmatch(bare):
+    is_length = along is not None or _LENGTHS.fullmatch(bare) is not None
+    if match and match[3] and match[3].lower() == "in" and not is_length:  # as in voltage_in
+        bare, unit = name, None
+    if unit is None and not is_length:
         fix = f'if it is a length, write its unit: "{name} [mm]"; write an angle as a place at a known radius'
         refuse(path, line, "has one column beside the time, and its name does not say that it is a length", name, fix)
     if unit is not None and unit.lower() not in METERS:
@@ -93,14 +101,19 @@ def without_unit(name: str) -> tuple[str, str | None]:
     return (match[1] or match[3]).strip(), unit if unit in METERS else None
 
 
-def _marker(way: re.Pattern[str], names: Sequence[str]) -> str | None:
-    """The marker whose x, y, z these are, in this way of writing; None where they are not."""
+def _marker_of(names: Sequence[str], count: int) -> str | None:
+    """The marker whose first coordinates, as many as `count`, these are; None where they are not."""
+    return next((one for way in _WAYS if (one := _marker(way, names, count)) is not None), None)
+
+
+def _marker(way: re.Pattern[str], names: Sequence[str], count: int) -> str | None:
+    """The same in this way of writing."""
     matches = [way.fullmatch(name) for name in names]
-    if len(names) < 3 or any(match is None for match in matches):
+    if len(names) < count or any(match is None for match in matches):
         return None
     axes = [match["axis"].lower() for match in matches if match]
     stems = {match["marker"] for match in matches if match}
-    if axes != list(AXES) or len(stems) > 1:
+    if axes != list(AXES[:count]) or len(stems) > 1:
         return None
     stem = stems.pop()
     return f"m{stem}" if way is not _WAYS[0] and (not stem or stem.isdigit()) else stem  # a number is no name
@@ -109,7 +122,7 @@ def _marker(way: re.Pattern[str], names: Sequence[str]) -> str | None:
 def _refuse_three(path: Path, line: int, names: Sequence[str]) -> NoReturn:
     axes = [name[-1:].lower() for name in names]
     if axes == ["x", "y", "x"] or (len(names) == 2 and axes == ["x", "y"]):
-        fix = "write a third column for each marker, of zeros if all moves in one plane; lengths, not pixels"
+        fix = "write x, y and z of each marker, or x and y of all where one camera tracks them"
         refuse(path, line, "has only x and y of a marker", names[0], fix)
     first = _WAYS[0].fullmatch(names[0])
     marker = first["marker"] if first and first["axis"].lower() == "x" else names[0]

@@ -177,6 +177,8 @@ def _read_wide(path: Path, header: list[str], header_line: int, rows: list[Row],
     table = np.array([[number(path, line, cells[k]) for k in own] for line, cells in rows])
     if len(names) == 1:
         table = np.where(np.arange(3) == axis, table, 0.0 * table)  # nan stays nan
+    elif len(names) == 2 * len(markers):
+        table = np.insert(table, range(2, len(names) + 1, 2), 0.0 * table[:, 1::2], axis=1)
     metadata = {} if unit is None else {"units": unit}
     return MarkerData(without_zeros(table.reshape(len(rows), -1, 3)), times, tuple(markers), metadata=metadata)
 
