@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.config import load, parse
+from sheetbend.config.named_files import named_files
 from sheetbend.config.reference import fabric_tables, renewed
 from sheetbend.config.values import with_finer, with_values, write
 
@@ -354,6 +355,18 @@ class TestValues:
         assert e.scene.quantities["rope_EI"].value == 3e-3
         assert e.scene.quantities["rope_bend_damping"].value == 0.05
         assert tomllib.loads((folder / "deeper" / "fitted.toml").read_text())["recording"][0]["file"] == "../swing.npz"
+
+    def test_every_file_that_is_named_is_found_from_a_written_configuration(self, folder: Path) -> None:
+        """Those of force sensors, of colliders and of solids were left as they were."""
+        times = np.arange(1, 21) / 100
+        sb.ForceRecording(times, np.zeros((20, 3))).save(folder / "force.npz")
+        force = '\n[[recording.force]]\nfile = "force.npz"\nat = ["rope:start"]\nsigma = 0.01'
+        study = load(extended(folder, "", force))
+        (folder / "deeper").mkdir()
+        write(study.config, folder / "deeper" / "fitted.toml", folder)
+        assert len(load(folder / "deeper" / "fitted.toml").experiments[0].forces) == 1
+        content = {"a": [{"file": "x", "tools": {"robot": "y", "file": "z"}}], "file": {"file": 1.0, "cloud": "w"}}
+        assert [table[key] for table, key in named_files(content)] == ["x", "y", "z", "w"]
 
     def test_short_windows_are_for_the_first_start_only(self, folder: Path) -> None:
         study = load(written(folder, ROPE + "\n[fit]\nwindows = [0.1, 0.2]\nthreads = 2\n"))

@@ -141,6 +141,17 @@ class TestResume:
         assert found["converged"] and not found["interrupted"] and found["exit_code"] == 0
         assert not (OUT / "journal.sqlite").exists()
 
+    def test_ctrl_c_before_there_is_a_result_keeps_the_journal(
+        self, config: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def stops(*args: object, **options: object) -> None:
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr("sheetbend.cli.fit.run_fit", stops)
+        result = run("fit", config)
+        assert result.exit_code == 130 and "--resume goes on from here" in result.stdout
+        assert (OUT / "journal.sqlite").exists() and not (OUT / "fit.json").exists()
+
     @pytest.mark.parametrize(
         ("old", "new", "named"),
         [

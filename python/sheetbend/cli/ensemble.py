@@ -12,6 +12,8 @@ from pathlib import Path
 from rich.console import Console
 
 from ..config import GrippedConfig, parse_any
+from ..config.file import content
+from ..config.named_files import named_files
 from ..errors import ConfigError, InputError, SheetbendError
 from ..files.door import noting, reading
 from ..files.whole import UnwrittenError, write_text
@@ -104,15 +106,14 @@ def _tasks(pattern: str, output: Path) -> tuple[list[tuple[Path, Path]], dict[Pa
 
 
 def _made(path: Path, folder: Path) -> FitResult | None:
-    """The result that is there, if it is newer than the configuration and its recordings, and no journal is left."""
+    """The result that is there, if it is newer than the configuration and the files that this names, and no journal is
+    left."""
     result = folder / RESULT
     if not result.is_file() or (folder / NAME).exists():
         return None
-    config = parse_any(path)
-    if isinstance(config, GrippedConfig):
+    if isinstance(parse_any(path), GrippedConfig):
         return None
-    named = [name for r in config.recording for name in (r.file, r.cloud) if name is not None]
-    files = [path, *(path.parent / name for name in named)]
+    files = [path, *(path.parent / table[key] for table, key in named_files(content(path)))]
     made = result.stat().st_mtime_ns
     if not all(file.is_file() and file.stat().st_mtime_ns < made for file in files):
         return None

@@ -44,6 +44,8 @@ from .progress import Iterations
 from .screen import heading, listing, show
 from .targets import check_targets
 
+STAYS = "the journal stays: the same command with --resume goes on from here"
+
 
 def fit(
     config: Annotated[
@@ -217,7 +219,12 @@ def _kept(
         console.print(text, markup=False, soft_wrap=True)
 
     with alone("--output", folder), journal_in(folder, made_from(config, recordings), resume, say) as journal:
-        yield folder, journal
+        try:
+            yield folder, journal
+        except KeyboardInterrupt:  # before there is any result
+            if journal is not None:
+                say(STAYS)
+            raise
 
 
 def _end(console: Console, journal: Journal | None, outcome: Outcome) -> None:
@@ -225,7 +232,7 @@ def _end(console: Console, journal: Journal | None, outcome: Outcome) -> None:
     if journal is None:
         return
     if outcome.code is Code.INTERRUPTED:
-        console.print("the journal stays: the same command with --resume goes on from here", soft_wrap=True)
+        console.print(STAYS, soft_wrap=True)
     else:
         journal.finish()
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from ..files.whole import write_text
 from ..optional import require
+from .named_files import named_files
 from .schema import Config, ParameterSection, RecordingSection
 
 
@@ -79,14 +80,8 @@ def write(config: Config, path: Path, folder: Path) -> None:
         MissingExtraError: tomli-w is not installed.
     """
     content: dict[str, Any] = config.model_dump(exclude_unset=True, exclude_none=True)
-    meshes = [cloth["mesh"] for cloth in content["scene"].get("cloth", [])]
-    tools = content["scene"].get("tool", [])
-    recordings = content.get("recording", [])
-    with_files = [(table, "file") for table in (*recordings, *meshes, *tools) if "file" in table]
-    with_files += [(table, key) for table in recordings for key in ("cloud", "driven_motion") if key in table]
-    with_files += [(r["tools"], name) for r in content.get("recording", []) for name in r.get("tools", {})]
-    for table, at in with_files:
-        table[at] = Path(os.path.relpath(folder / table[at], path.parent)).as_posix()
+    for table, key in list(named_files(content)):
+        table[key] = Path(os.path.relpath(folder / table[key], path.parent)).as_posix()
     write_text(path, require("tomli_w", "cli").dumps(content))
 
 

@@ -140,19 +140,35 @@ class Search:
         return Found(_best_first(ends), name, False, began, ways[0].condition)
 
     def _raced(self, problem: FitProblem, name: str, points: Sequence[np.ndarray]) -> Found:
-        """Race all starts, and go on from the best of each group. Ctrl-C passes through as long as they race."""
+        """Race all starts, and go on from the best of each group. Ctrl-C while they race ends at the best of those that
+        have ended.
+
+        Raises:
+            KeyboardInterrupt: none has, or the whole motion has no answer there.
+        """
         whole = problem.uncorrected(problem.recordings) if problem.corrects_markers else problem
         auto = isinstance(self.windows, str)
         course = Course(whole, chosen(problem, growths(problem, points[0])) if auto else [*map(float, self.windows)])
         window = None if math.isinf(course.lengths[-1]) else course.lengths[-1]
         condition = self._told(Approach(course.last, points[0]), window)
 
+        ended = list[Raced]()
+
         def observe(end: Raced, number: int) -> None:
+            ended.append(end)
             if self.progress is not None and math.isfinite(end.cost):
                 self.progress(Progress(0, end.cost, end.u.copy(), window, start=(number, len(points))))
 
-        raced = race(course, points, observe)
         onward = replace(self, windows=() if window is None else (window,))
+        try:
+            raced = race(course, points, observe)
+        except KeyboardInterrupt:
+            best = min(ended, key=lambda end: end.cost, default=None)
+            end = None if best is None else _Way(onward, problem, name, best.u, u=best.u).interrupted()
+            if end is None:
+                raise
+            words = f"interrupted: the best of {len(ended)} starts that had ended of {len(points)}"
+            return Found((replace(end, message=words),), name, True, growths(problem, end.u), condition)
         ways = []
         for number, group in enumerate(groups_of(raced), 1):
             best, first = min(group, key=lambda end: end.cost), whole.cost(group[0].first)
