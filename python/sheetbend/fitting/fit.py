@@ -27,7 +27,7 @@ from ..minimum.linear_algebra import one_blas_thread
 from ..minimum.problem import FitProblem
 from ..minimum.progress import Observer
 from ..minimum.search import Search
-from ..minimum.smooth import Smooth, with_fields
+from ..minimum.smooth import Field, Smooth, with_fields
 from ..minimum.workers import shared_out
 from ..optional import require
 from ..quantities.parameters import Parameter, Parameters
@@ -207,19 +207,7 @@ def fit(
             companions(e, fitted, wanted)
     experiments, found_at, undone = joined(experiments, wanted, threads, progress)
     fitted = _fitted(experiments)
-    if not undone:
-        wanted, found_at, fields, undone = settled(fitted, wanted, found_at, fields, threads, windows, progress)
-    problem = FitProblem(fitted, wanted, threads=threads, expanded=found_at)
-    problem.check_start()
-    check_given(asked.given, problem)
-    check_bootstrap(bootstrap, problem)
-    reached = reach(search, problem, beginnings, undone)
-    if fields and reached.left_its_end and not reached.interrupted:
-        # Sizes and lengths came from the minimum that was left, so they are sought once more from the lower one.
-        found_at = problem.parameters.starting_at(reached.best.u)
-        wanted, found_at, fields, undone = settled(fitted, wanted, found_at, fields, threads, (), progress)
-        problem = FitProblem(fitted, wanted, threads=threads, expanded=found_at)
-        reached = reach(replace(search, windows=(), starts=()), problem, beginnings, undone)
+    reached, wanted, fields = _minimum(search, asked, fitted, wanted, fields, found_at, undone, beginnings)
     if reached.all_lost:
         asked = asked.without_refits()
     conclusion, left_out, interrupted = _concluded(reached, experiments, wanted, asked, leave_one_out)
@@ -233,6 +221,34 @@ def fit(
             result, warnings=(*result.warnings, f"SciPy stands in for Ceres, which does not load: {trouble}")
         )
     return Fit(result, tuple(comparisons), wanted, corrected, conclusion.values)
+
+
+def _minimum(
+    search: Search,
+    asked: Asked,
+    fitted: Sequence[Experiment],
+    wanted: Parameters,
+    fields: tuple[Field, ...],
+    found_at: Parameters | None,
+    undone: str,
+    beginnings: bool,
+) -> tuple[Reached, Parameters, tuple[Field, ...]]:
+    """The minimum, and the parameters and fields with the priors that are most likely there."""
+    threads, progress = asked.threads, search.progress
+    if not undone:
+        wanted, found_at, fields, undone = settled(fitted, wanted, found_at, fields, threads, search.windows, progress)
+    problem = FitProblem(fitted, wanted, threads=threads, expanded=found_at)
+    problem.check_start()
+    check_given(asked.given, problem)
+    check_bootstrap(asked.bootstrap, problem)
+    reached = reach(search, problem, beginnings, undone)
+    if fields and reached.left_its_end and not reached.interrupted:
+        # Sizes and lengths came from the minimum that was left, so they are sought once more from the lower one.
+        found_at = problem.parameters.starting_at(reached.best.u)
+        wanted, found_at, fields, undone = settled(fitted, wanted, found_at, fields, threads, (), progress)
+        problem = FitProblem(fitted, wanted, threads=threads, expanded=found_at)
+        reached = reach(replace(search, windows=(), starts=()), problem, beginnings, undone)
+    return reached, wanted, fields
 
 
 def _concluded(
