@@ -4,8 +4,8 @@ A short recording shows how much energy a hinge loses, and hardly by what: a pen
 dry friction was fitted with a viscosity 30 % too large, "identified" to 0.6 %, and with residuals like noise. So a fit
 says what it would move if 0.3 of the loss were dry friction. Where the residuals ask for some, it is named.
 
-Dry friction has no derivative by which it could begin, since it may stick. But while a hinge slides the torque is
-proportional to it, and one simulation with a little of it tells what it changes.
+A hinge with dry friction may stick, so no tangent at zero tells what it changes. While the hinge slides, the torque is
+proportional to it, and one simulation with a little of it does.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import numpy as np
 from ..arrays.timeseries import Array
 from ..errors import SheetbendError
 from ..experiment.experiment import Experiment
+from ..experiment.found_start import start_nodes
 from ..minimum.problem import FitProblem
 from ..motion.simulate import simulate
 from ..motion.values import constraint_values
@@ -29,6 +30,7 @@ from .tangents import residuals
 
 DRY = {"hinge": "friction_hinge", "joint_angle": "joint_friction"}  # by viscous kind, that of dry friction
 SHARE, TRIED = 0.3, 0.05  # of what viscosity takes: what a report tells, and what is simulated
+MOST = 12  # groups of hinges, each of which takes a simulation: a chain of more is not asked
 OF_IT = "of the viscous loss"
 
 
@@ -49,12 +51,12 @@ class Dry:
 
 
 def dry_frictions(problem: FitProblem, u: Array, i: int, corrected: Array | None) -> Iterator[Dry]:
-    """Of each viscous hinge of the i-th experiment that turns and has none, at u (free,). Takes a simulation, and two
-    more for each hinge."""
+    """Of each viscous hinge of the i-th experiment that turns and has none, at u (free,). Takes two
+    simulations, and one more for each group of hinges."""
     e = problem.experiment_at(i, u)
     e = replace(e, solver=replace(e.solver, extrapolate=1))
     bare = [] if e.static else list(_bare(e.scene))
-    if not bare:
+    if not 0 < len(bare) <= MOST:
         return
     values = problem.values_of(e, u)
     inputs = e.scene.compiled.inputs(e.scene.compiled.values(values))
@@ -91,7 +93,7 @@ def _bare(scene: Scene) -> Iterator[tuple[int, int, Group]]:
 def _turned(e: Experiment, times: Array, values: dict[str, float]) -> dict[str, Array]:
     """(1 + frames, hinges) rad of each group, at the start and at each frame, without jumps by whole turns."""
     at = np.unique(np.rint(np.maximum(e.scene_times(times, values), 0.0) / e.solver.h)) * e.solver.h
-    nodes = simulate(e.scene, np.unique([0.0, *at]), e.solver, values).nodes
+    nodes = simulate(e.scene, np.unique([0.0, *at]), e.solver, values, start_nodes(e, values)).nodes
     each = [constraint_values(e.scene, x, values) for x in nodes]
     return {g.name: np.unwrap([C[g.name][:, 0] for C in each], axis=0) for g in e.scene.groups if g.kind in DRY}
 
