@@ -6,6 +6,7 @@ import re
 import tomllib
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -220,6 +221,8 @@ def test_what_hangs_or_falls_tells_which_way_is_up(tmp_path: Path) -> None:
         assert content["scene"]["gravity"] == [0.0, 0.0, 9.81] and "-z points up, as the motion shows" in said
         (held,) = content["scene"].get("rod", []) + content["scene"].get("rope", [])
         assert held.get("pinned") == [0] or "clamp_start" in held or held["grip"][0]["markers"] == names[:1]
+    said, content = outcome(tmp_path / "cloth", turned_over(replace(takes.cloth(1.0), gravity=None), rng))
+    assert content["scene"]["gravity"] == [0.0, 0.0, 9.81] and content["scene"]["cloth"][0]["pinned"] == ["top"]
     pendulum = sb.Recording.load(EXPERIMENTS / SHIPPED["pendulum"])
     said, content = outcome(tmp_path / "pendulum", turned_over(pendulum, rng))
     assert not content and "hang upward" in said and "r.positions * [1, -1, -1]" in said

@@ -37,11 +37,12 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     if not s.sheet:
         return None
     if s.up_by == "guess":
-        turned = replace(s, up=3 - s.up)
-        for guess in (s, turned):  # a cloth does not stand on the edge that holds it
+        guesses = [s, replace(s, up=3 - s.up)]
+        for guess in [*guesses, *(seen.upside_down() for seen in guesses)]:  # it does not stand on what holds it
             found = _described([replace(takes[0], seen=guess), *takes[1:]], measured, stands=False)
             if found is not None:
-                return found._replace(up=None if guess is s else "xyz"[guess.up])
+                sign = "" if guess.gravity[guess.up] < 0.0 else "-"
+                return found._replace(up=None if guess is s else f"{sign}{'xyz'[guess.up]}")
     return _described(takes, measured, stands=True)
 
 
