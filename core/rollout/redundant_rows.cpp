@@ -6,7 +6,6 @@
 #include <sstream>
 
 #include "core/rollout/rollout.h"
-#include "core/solver/loop_rows.h"
 
 namespace sheetbend {
 namespace {
@@ -65,7 +64,6 @@ void find_among_rigid(const SubstepState<double>& substep, const DirectBlock& bl
   State state;
   state.resize(substep.scene, block, 0);
   begin_block(substep, block, state);
-  let_loop_rows_give_way(substep, block, pack_kernels(), substep.q, state);
   RigidRows rigid;
   const std::vector<double> unit(block.particles.size(), 1.0);
   const RigidRows::Given given{block, state.values, state.C_r, unit};
@@ -73,8 +71,6 @@ void find_among_rigid(const SubstepState<double>& substep, const DirectBlock& bl
   rigid.find(substep.scene, given, at);
   if (rigid.empty()) return;
   rigid.leave_out(given, at);
-  if (block.loop_pivot > 0.0)
-    for (int row = 0; row < rigid.size(); ++row) rigid.set_left_out(row, state.diagonal[rigid.row(row)] == beyond_all);
   for (int row = 0; row < rigid.size(); ++row) {
     if (!rigid.left_out(row) || !rigid.moves(row)) continue;
     const std::vector<double> c = rigid.as_sum(given, at, row);

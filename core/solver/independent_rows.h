@@ -1,9 +1,6 @@
 // Which rigid rows of a condensed block follow from its other rigid rows: those that J W J^T has no pivot for. The factor of other blocks finds them as it
 // goes; a condensed block's stands over particles, and knows no such rows.
-//
-// The row that has the largest share of its own diagonal left as a pivot is kept next (complete pivoting: Higham 2002, 10.3). Any other choice keeps as
-// many rows and moves bodies in the same way, but perhaps rows that hardly differ: where the shear of a body was left out and a hinge in line with another
-// was kept, the two hinges pushed against each other with 300 times the forces that moved the bodies.
+// A row that is said by rows before it in the block is left out, so that small changes of a scene leave out the same one.
 // Dense: as the border of the condensed solve, for few rigid rows.
 #pragma once
 
@@ -68,24 +65,19 @@ class IndependentRows {
     kept_.assign(n, false);
     factor_.resize(n * n);
     rest_.resize(n);
-    const auto diagonal = [&](std::size_t v) { return matrix_[v * n + v]; };
-    for (std::size_t v = 0; v < n; ++v) rest_[v] = diagonal(v);
+    for (std::size_t v = 0; v < n; ++v) rest_[v] = matrix_[v * n + v];
     for (std::size_t k = 0; k < n; ++k) {
-      std::size_t next = n;
-      for (std::size_t v = 0; v < n; ++v)
-        if (!kept_[v] && rest_[v] > least * diagonal(v) &&
-            (next == n || rest_[v] * diagonal(next) > rest_[next] * diagonal(v)))
-          next = v;
-      if (next == n) return;
-      kept_[next] = true;
+      if (!(rest_[k] > least * matrix_[k * n + k])) continue;
+      kept_[k] = true;
       double* column = &factor_[k * n];
-      std::copy_n(&matrix_[next * n], n, column);
+      std::copy_n(&matrix_[k * n], n, column);
       for (std::size_t j = 0; j < k; ++j) {
-        const double *before = &factor_[j * n], share = before[next];
-        for (std::size_t v = 0; v < n; ++v) column[v] -= share * before[v];
+        if (!kept_[j]) continue;
+        const double *before = &factor_[j * n], share = before[k];
+        for (std::size_t v = k; v < n; ++v) column[v] -= share * before[v];
       }
-      const double scale = 1.0 / std::sqrt(rest_[next]);
-      for (std::size_t v = 0; v < n; ++v) {
+      const double scale = 1.0 / std::sqrt(rest_[k]);
+      for (std::size_t v = k; v < n; ++v) {
         column[v] *= scale;
         rest_[v] -= column[v] * column[v];
       }

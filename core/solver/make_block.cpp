@@ -180,11 +180,12 @@ std::vector<char> touching_itself(const Scene& scene) {
 DirectBlock make_block(const Scene& scene, std::vector<Member> members, const SolverOptions& options,
                        const std::vector<int>& loose) {
   const bool condensed = options.partition != Partition::direct;
+  const bool implicit = options.partition == Partition::implicit;
+  const double loop_pivot = !implicit && closes_loop(scene, members) ? pivot_of_loop : 0.0;
+  if (condensed && loop_pivot > 0.0) order_bodies_first(scene, members);
   std::vector<BlockVolume> volumes = volumes_around(scene, members);
   Users users = number_rows(scene, members, volumes);
   for (const int node : loose) users.push_back({node, {}});
-  const bool implicit = options.partition == Partition::implicit;
-  const double loop_pivot = !implicit && closes_loop(scene, members) ? pivot_of_loop : 0.0;
   FactorStructure structure =
       condensed ? FactorStructure(0, {}) : structure_of(scene, members, volumes, users, loop_pivot);
   if (!condensed && !structure.banded()) {

@@ -46,7 +46,6 @@ class RigidRows {
 
   // Decides at these coordinates which rows are left out.
   void leave_out(const Given& given, const double* at);
-  void set_left_out(int j, bool left_out) { left_out_[j] = left_out; }  // whatever it decided
   // A row that is left out as a sum of the others, there: J W J^T c = J W J_row^T. Its residual less theirs is the contradiction.
   std::vector<double> as_sum(const Given& given, const double* at, int row);
 
