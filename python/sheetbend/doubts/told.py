@@ -52,7 +52,7 @@ GROUPS: Mapping[str, tuple[str, tuple[float, str]]] = {
 }
 """Told numbers that are no quantities, by the name under which a standard deviation is given: unit ("" where it is
 relative) and step."""
-LATER, SLOWER, LARGER = "frames later", "clock", "size of the recording"
+LATER, SLOWER, LARGER = "time of every frame", "frame rate", "size of the recording"
 ASIDE, DRAFT, BESIDE = "place of the drive", "draft along", "offset of markers"
 _NONE = np.zeros(0)
 
