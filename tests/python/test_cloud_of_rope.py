@@ -177,7 +177,7 @@ def test_errors_of_given_numbers_move_the_residuals_of_a_cloud() -> None:
     u = problem.parameters.initial()
     told = {one.label: one.column for one in told_numbers(problem, u)[0]}
     assert {"rope_length", "rope_density", "gravity toward x", "size of gravity", "draft along z"} <= told.keys()
-    assert not {"clock", "frames later", "clamps along x"} & told.keys()
+    assert not {"frame rate", "recording delay", "clamps along x"} & told.keys()
 
     def residuals(by: float) -> Array:
         scene = rope(1.2)

@@ -75,7 +75,7 @@ def test_a_rope_that_two_hands_move_over_a_table(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_fit_of_a_rope_on_a_table(tmp_path: Path) -> None:
     """A finer mesh and a shorter substep made it, and the hand that drags and turns it is as noisy as the rope."""
-    recording = takes.rope_on_table("body", flat=True)
+    recording = takes.rope_on_table("body")
     drafted(tmp_path, recording, "--density", str(takes.DENSITY))
     result = run("fit", tmp_path / "take.toml", "--output", tmp_path / "out")
     assert result.exit_code in (0, 4), result.output

@@ -70,6 +70,15 @@ def test_intervals_hold_the_truth_for_nineteen_of_twenty_laboratories():
     assert 20 <= outside <= 75  # of 1200: 60 where no misfit widens them, fewer by what it does
 
 
+def test_a_value_below_its_uncertainty_keeps_digits():
+    """The table said 0.0000 N m, in 0.0000 to 0.0053."""
+    found = textile.fit_fabric([measured(product(shear=1.0), 2.0)], START, ["shear"])
+    ((name, value, interval, _),) = found.sections()[0].rows
+    assert name == "shear" and float(value.split()[0]) == approx(found.fabric.shear, rel=0.05)
+    low, high = map(float, interval.split(" to "))
+    assert 0.0 < low < found.fabric.shear / 20 and high > 20 * found.fabric.shear
+
+
 @pytest.mark.slow
 def test_a_pull_along_the_yarns_does_not_contain_shear():
     found = textile.fit_fabric([measured(pulled("warp"))], START, ["warp", "shear"])

@@ -41,7 +41,7 @@ class Lead:
 
     @property
     def label(self) -> str:
-        return f"lead of {self.who}"
+        return f"free length at {self.who}"
 
     def moves(self, scene: Scene, place: Place) -> float:
         """m, by which a marker then sits farther along the rope as it was told, per m of the lead: it keeps its

@@ -112,7 +112,7 @@ def written(
     head = comment(f"Written by `sheetbend new` from {joined(files)}. It shows {kind}.")
     head += ["#", "# Seen:", *(line for s in told for line in _item(s))]
     head += ["#", f"# Not known from the {source}:", *(line for s in unknown for line in _item(s))]
-    head += table("[experiment]", {"name": name, "about": f"{kind}, as `sheetbend new` sees it"})
+    head += table("[experiment]", {"name": name, "about": f"{kind}, drafted by sheetbend new"})
     return Draft(kind, tuple(told), tuple(unknown), "\n".join([*head, *lines]) + "\n")
 
 

@@ -72,8 +72,8 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     rope = model_of(marked_by(takes, found, holding), order, measured, pushed, table)
     kind = "a rope at rest" if s.static else "a rope on a table" if table is not None else "a rope"
     driving = tuple(name for here in rope.marked for grip in here.held.grips for name in grip["markers"])
-    up = "xyz"[s.up] if table is not None and s.up_by == "guess" else None
-    return Description(kind, notes_of(rope), unknown_of(rope), lines_of(rope), up, driving)
+    above = "xyz"[s.up] if table is not None and s.up_by == "guess" else None
+    return Description(kind, notes_of(rope), unknown_of(rope), lines_of(rope), above, driving)
 
 
 def _upside_down(s: Seen, found: Held, order: tuple[int, ...]) -> bool:

@@ -236,10 +236,10 @@ def _laid(s: Seen, found: Held) -> Start:
     if not s.rest:
         said = ["it moves at the first frame: place and speed at the start are those of the markers"]
         return Start({"points": "recording", "velocity": "recording"}, said)
-    said, way = f"it rests for the first {s.rest:.2g} s", _straight(s, found.order)
+    rests, way = f"it rests for the first {s.rest:.2g} s", _straight(s, found.order)
     if way is not None:
-        return Start({"direction": way}, [f"{said}, straight"])
-    return Start({"points": "recording", "velocity": "recording", "smoothing": round(s.rest, 4)}, [said])
+        return Start({"direction": way}, [f"{rests}, straight"])
+    return Start({"points": "recording", "velocity": "recording", "smoothing": round(s.rest, 4)}, [rests])
 
 
 def _straight(s: Seen, order: tuple[int, ...]) -> list[float] | None:

@@ -95,11 +95,10 @@ def held_out_motion(result: FitData) -> Section:
     """How much of the motion that the fit did not see is predicted, and its rhythm."""
     rows = [_motion_row(recording) for recording in result.recordings if recording.motion]
     headers = ("recording", "motion rms", "unit", "held-out/motion", "frequency measured", "simulated", "difference")
-    note = (
-        "of the measured markers about their mean over the held-out part; "
-        "frequencies in Hz, from the highest peak there"
-    )
-    return Section("Held-out motion", headers, tuple(rows), (("motion", note),) if rows else ())
+    notes = [("motion", "of the measured markers about their mean over the held-out part")]
+    if any(row[4] for row in rows):
+        notes.append(("frequency", "in Hz, of the highest peak in the spectrum of the held-out part"))
+    return Section("Held-out motion", headers, tuple(rows), tuple(notes) if rows else ())
 
 
 def _motion_row(recording: RecordingFit) -> tuple[str, ...]:

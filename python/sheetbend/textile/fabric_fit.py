@@ -119,7 +119,7 @@ class FabricFit:
         found = tuple(
             (e.name, f"{values[0]} {e.unit}".rstrip(), f"{values[1]} to {values[2]}" if values[1] else "open", e.words)
             for e in self.estimates
-            for values in [figures((e.value, e.lower, e.upper), e.half_width)]
+            for values in [_figures(e)]
         )
         read = tuple(
             (
@@ -142,6 +142,14 @@ class FabricFit:
             Section("Fabric", ("number", "value", "95 % interval", "verdict"), found),
             Section("Readings", ("test", "laboratory", "fabric", "off by, sigma"), read, (note, *left_out)),
         )
+
+
+def _figures(e: Estimate) -> list[str]:
+    """Value and ends of the interval. To the digits of a much larger uncertainty, none of the value is left."""
+    numbers = (e.value, e.lower, e.upper)
+    if e.half_width and 0.0 < 10.0 * e.value < e.half_width:
+        return ["" if number is None else short(number, 2) for number in numbers]
+    return figures(numbers, e.half_width)
 
 
 def _widening(misfit: float, freedom: int) -> float:
