@@ -11,6 +11,9 @@ import pytest
 import sheetbend as sb
 from commands import last_line, run
 from sheetbend.errors import InputError
+from sheetbend.experiment.wanted import as_parameters
+from sheetbend.fitting.variants import _support, changes
+from test_shooting import swing
 
 TIMES = np.arange(40) / 50
 SOLVER = sb.Solver(h=1 / 200)
@@ -91,6 +94,39 @@ def test_twice_the_recordings_leave_a_root_of_it() -> None:
     again = next(v for v in plan.variants if v.name == "the same recordings once more")
     for name in TRUE:
         assert again.half_widths[name] == pytest.approx(plan[name].half_width / np.sqrt(2.0), rel=0.1)
+
+
+def test_a_sensor_at_a_hinge_of_a_body_reads_its_weight() -> None:
+    """A body's nodes are hidden, and the place about which torques count was taken from beside all arrays. What has
+    slid in a hinge with friction is a pinned node too, and no place."""
+    scene = sb.Scene("bar")
+    body = scene.add_body("bar", mass=0.4, inertia=[4e-3] * 3, center=(0.0, 0.0, -0.2))
+    sb.hinge(None, body, at=(0.0, 0.0, 0.0), axis=(0.0, -1.0, 0.0), friction=0.01, slip_angle=1e-3)
+    held = _support(scene)
+    assert held and set(held) < set(scene.held) and set(held) <= set(scene.body_nodes.ravel().tolist())
+    read = sb.simulate_forces(scene, np.arange(1, 20) / 50, held, sb.Solver(h=1 / 200))
+    assert read.forces == pytest.approx(np.tile([0.0, 0.0, 0.4 * 9.81], (19, 1)), abs=1e-6)
+
+
+def test_a_motion_that_is_shot_gets_no_sensor() -> None:
+    e = swing(shooting=0.5)
+    names = [
+        name for name, _, _ in changes([e], as_parameters(["arm_inertia"], [e]), as_parameters(["arm_inertia"], [e]))
+    ]
+    assert names == ["the same recordings once more", "arm_inertia measured to 1 %"]
+
+
+def test_changes_for_many_parameters_are_columns() -> None:
+    plan = sb.identify(planned(), parameters=["rope_EI", "rope_bend_damping"])
+    many = replace(plan, estimates=tuple(replace(e, name=f"{e.name}_{k}") for k in range(5) for e in plan.estimates))
+    variants = [
+        replace(v, half_widths={e.name: 1.0 for e in many.estimates}, verdicts={e.name: "" for e in many.estimates})
+        for v in plan.variants
+    ]
+    text = replace(many, variants=tuple(variants)).report()
+    told = text.partition("What changes of the plan would give")[2]
+    assert "  parameter " in told and "1: one more marker, in the widest gap" in told
+    assert max(map(len, told.splitlines())) <= 100 and "  change " in plan.report()
 
 
 def test_noise_scales_intervals_and_weak_combinations_are_named() -> None:

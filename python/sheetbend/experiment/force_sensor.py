@@ -206,7 +206,7 @@ class ForceSensor:
         return {
             "particles": scene.places_of(every).tolist(),
             "carried": scene.places_of(carried(scene, every)).tolist(),
-            "about": every[0],
+            "about": scene.places_of(every[:1])[0],
             "arm": [float(a) for a in self.arm],
             "sign": 1.0 if self.reads == "support" else -1.0,
             "times": instants[order],

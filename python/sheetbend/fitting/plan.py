@@ -11,7 +11,7 @@ from typing import Any
 
 from ..files.whole import write_text
 from ..quantities.wording import figures, short
-from ..report.tables import Section, plain_section
+from ..report.tables import Section, plain_section, wide
 from ..result.estimate import Estimate, estimate_of
 
 FORMAT = "sheetbend plan 1"
@@ -121,14 +121,20 @@ class Plan:
         return (*gauges, ("known least", self.weakest)) if self.weakest else gauges
 
     def _compared(self) -> Section:
-        """Half-widths of each variant over those of the plan."""
+        """Half-widths of each variant over those of the plan, of many parameters one below the other."""
         names = [e.name for e in self.told]
         rows = []
         for variant in self.variants:
             cells = [_gain(self[name], variant.half_widths[name], variant.verdicts[name]) for name in names]
             rows.append((variant.name, *cells))
-        note = ("+/-", "half-width over that of the plan; a verdict in its place where that changes")
-        return Section("What changes of the plan would give", ("change", *names), tuple(rows), (note,) if rows else ())
+        title, headers = "What changes of the plan would give", ("change", *names)
+        notes = [("+/-", "half-width over that of the plan; a verdict in its place where that changes")] if rows else []
+        if rows and wide([headers, *rows]):
+            notes += [(str(k), variant.name) for k, variant in enumerate(self.variants, 1)]
+            numbered = [(str(k), *row[1:]) for k, row in enumerate(rows, 1)]
+            (_, *headers), *rows = zip(headers, *numbered, strict=True)
+            return Section(title, ("parameter", *headers), tuple(rows), tuple(notes))
+        return Section(title, headers, tuple(rows), tuple(notes))
 
     def to_dict(self) -> dict[str, Any]:
         """Strict JSON values."""

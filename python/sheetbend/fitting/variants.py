@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..errors import InputError
 from ..experiment.experiment import Experiment
 from ..experiment.force_sensor import ForceSensor
 from ..minimum.smooth import modes_over_time
@@ -15,6 +16,7 @@ from ..objects.markers import Place, on_rope
 from ..quantities.parameters import Parameters
 from ..recording.force_recording import ForceRecording
 from ..recording.recording import Recording
+from ..scene.scene import Scene
 
 MEASURED = 0.01  # relative error of a parameter that is measured apart
 FORCE = 0.01  # of the weight of the scene: error of a force sensor
@@ -81,8 +83,8 @@ def _arc_of(place: Place, arc: dict[int, float]) -> float | None:
 
 
 def _with_sensor(e: Experiment) -> Experiment:
-    """A force sensor at the particles that are held; the same experiment where it cannot have one."""
-    held = e.scene.held
+    """A force sensor at what is held; the same experiment where it cannot have one."""
+    held = _support(e.scene)
     if e.static or e.forces or e.has_unknowns or not held:
         return e
     times = e.recording.times[e.recording.times > e.t0]
@@ -92,4 +94,14 @@ def _with_sensor(e: Experiment) -> Experiment:
     offset, size = compiled.layout["mass"]
     weight = GRAVITY * float(np.sum(compiled.inputs()[offset : offset + size]))
     forces = ForceRecording(times, np.zeros((len(times), 3)), name="new sensor")
-    return replace(e, forces=[ForceSensor(recording=forces, at=held, sigma=max(FORCE * weight, 1e-12))])
+    try:
+        return replace(e, forces=[ForceSensor(recording=forces, at=held, sigma=max(FORCE * weight, 1e-12))])
+    except InputError:  # forces do not go with another of its fields, such as `shooting`
+        return e
+
+
+def _support(scene: Scene) -> list[int]:
+    """Held nodes that are places, and not the numbers that joints and what yields keep in pinned nodes."""
+    ends = [ghost for rope in scene.ropes.values() for ghost in (rope.start_ghost, rope.end_ghost)]
+    places = {*scene.body_nodes.ravel().tolist(), *scene.boundary.driven, *scene.directors, *ends}
+    return [node for node in scene.held if node >= 0 or node in places]
