@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -61,23 +61,11 @@ def _described(takes: Sequence[Take], measured: Measured, stands: bool) -> Descr
             "give a recording with markers about evenly on each cloth and some on what holds it, or write the "
             "configuration by hand",
         )
-    sheets, notes, unknown = [], list[str](), list[str]()
-    first = (sheet_of(s, name, own, others, density, {}, Measured()) for name, own in cloths.items())
-    bars = _bars([sheet for sheet in first if sheet is not None])
-    for name, own in cloths.items():
-        sheet = sheet_of(s, name, own, others, density, bars, measured)
-        if sheet is None:
-            unknown.append(lies_over(names, own, "the middle of their cloth is above two of its sides"))
-            continue
-        if not stands and any(hold.side == "bottom" and hold.own and not hold.moves for hold in sheet.held):
-            return None
-        sheets.append(sheet)
-    pairs = folded(s, [(sheet.own, sheet.flat) for sheet in sheets])
-    sides = {k for pair in pairs for k in pair}
-    for pair in pairs:
-        own = sorted(sheets[pair[0]].own + sheets[pair[1]].own)
-        unknown.append(lies_over(names, own, "they hang from two rows that face each other, on either side of it"))
-    sheets = [sheet for k, sheet in enumerate(sheets) if k not in sides]
+    found = _sheets(s, cloths, others, density, measured, stands)
+    if found is None:
+        return None
+    sheets, unknown = found
+    notes = list[str]()
     free = _freed(takes, sheets)
     for sheet in sheets:
         notes += seen_of(s, sheet, len(cloths) > 1)
@@ -103,6 +91,35 @@ def _described(takes: Sequence[Take], measured: Measured, stands: bool) -> Descr
     lines = _lines(takes, sheets, density, measured, free is not None)
     driving = tuple(names[k] for sheet in sheets for hold in sheet.held for k in hold.driving(s))
     return Description(kind, notes, unknown, lines, driving=driving)
+
+
+def _sheets(
+    s: Seen,
+    cloths: Mapping[str, list[int]],
+    others: Sequence[int],
+    density: float,
+    measured: Measured,
+    stands: bool,
+) -> tuple[list[Sheet], list[str]] | None:
+    """The cloths that hang, and in words what lies over something; None where a cloth stands on an edge that rests, and
+    may not."""
+    names, sheets, unknown = s.recording.markers, list[Sheet](), list[str]()
+    first = (sheet_of(s, name, own, others, density, {}, Measured()) for name, own in cloths.items())
+    bars = _bars([sheet for sheet in first if sheet is not None])
+    for name, own in cloths.items():
+        sheet = sheet_of(s, name, own, others, density, bars, measured)
+        if sheet is None:
+            unknown.append(lies_over(names, own, "the middle of their cloth is above two of its sides"))
+            continue
+        if not stands and any(hold.side == "bottom" and hold.own and not hold.moves for hold in sheet.held):
+            return None
+        sheets.append(sheet)
+    pairs = folded(s, [(sheet.own, sheet.flat) for sheet in sheets])
+    sides = {k for pair in pairs for k in pair}
+    for pair in pairs:
+        own = sorted(sheets[pair[0]].own + sheets[pair[1]].own)
+        unknown.append(lies_over(names, own, "they hang from two rows that face each other, on either side of it"))
+    return [sheet for k, sheet in enumerate(sheets) if k not in sides], unknown
 
 
 def _freed(takes: Sequence[Take], sheets: Sequence[Sheet]) -> Freed | None:
