@@ -34,20 +34,18 @@ class Slip(NamedTuple):
 
 
 def slid(s: Seen, found: Held) -> Slip | None:
-    """The first slip of a rope that hangs from its grip; None where none is seen. Between two hands, a slack rope that
-    gets taut looks alike."""
+    """The first slip of a rope that hangs from a hand with three markers or more; None where none is seen. Between two
+    hands, or behind one marker, a slack rope that gets taut looks alike."""
     if free_end(found) is None:
         return None
-    each = [_through(s, found, grip["at"], grip["markers"]) for grip in found.grips]
+    hands = [grip for grip in found.grips if len(grip["markers"]) >= 3]
+    each = [_through(s, found, grip["at"], grip["markers"]) for grip in hands]
     return min((slip for slip in each if slip is not None), key=lambda slip: slip.time, default=None)
 
 
 def _through(s: Seen, found: Held, at: str, hand: Sequence[str]) -> Slip | None:
     r, way = s.recording, found.order if at == "start" else found.order[::-1]
     own = [r.markers.index(name) for name in hand]
-    way = tuple(k for k in way if k not in own)
-    if len(way) < 2:
-        return None
     t, far = _distances(s, own, way, found.leads.get(at, 0.0))
     parts = [part for part in np.array_split(np.arange(len(t)), PARTS) if len(part) >= FRAMES]
     if len(parts) < PARTS:
@@ -72,15 +70,12 @@ def _distances(s: Seen, own: list[int], way: tuple[int, ...], lead: float) -> tu
     t, x = s.recording.times[seen], x[seen]
     if not len(t):
         return t, np.zeros(0)
-    if len(own) < 3:
-        chord = x[:, first] - x[:, min(own, key=lambda k: float(s.apart[k, first]))]
-    else:
-        turns, centers, _ = rigid_motion(x[:, own])
-        places = [np.einsum("fba,fb->fa", turns, x[:, k] - centers) for k in (first, second)]
-        along = np.mean(places[1] - places[0], axis=0)
-        lead = lead or float(s.apart[first, second])  # longer than it is, the distance would only get shorter
-        entry = places[0].mean(axis=0) - lead * along / np.linalg.norm(along)
-        chord = np.einsum("fab,fb->fa", turns, places[0] - entry)
+    turns, centers, _ = rigid_motion(x[:, own])
+    places = [np.einsum("fba,fb->fa", turns, x[:, k] - centers) for k in (first, second)]
+    along = np.mean(places[1] - places[0], axis=0)
+    lead = lead or float(s.apart[first, second])  # longer than it is, the distance would only get shorter
+    entry = places[0].mean(axis=0) - lead * along / np.linalg.norm(along)
+    chord = np.einsum("fab,fb->fa", turns, places[0] - entry)
     following = x[:, second] - x[:, first]
     d, c = np.linalg.norm(chord, axis=1), np.linalg.norm(following, axis=1)
     angle = np.arccos(np.clip(np.sum(chord * following, axis=1) / (d * c), -1.0, 1.0))
