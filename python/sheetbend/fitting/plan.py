@@ -132,8 +132,8 @@ class Plan:
         if rows and wide([headers, *rows]):
             notes += [(str(k), variant.name) for k, variant in enumerate(self.variants, 1)]
             numbered = [(str(k), *row[1:]) for k, row in enumerate(rows, 1)]
-            (_, *headers), *rows = zip(headers, *numbered, strict=True)
-            return Section(title, ("parameter", *headers), tuple(rows), tuple(notes))
+            (_, *columns), *turned = zip(headers, *numbered, strict=True)
+            return Section(title, ("parameter", *columns), tuple(turned), tuple(notes))
         return Section(title, headers, tuple(rows), tuple(notes))
 
     def to_dict(self) -> dict[str, Any]:
