@@ -411,6 +411,11 @@ def test_losses_frictions_and_poissons_ratio_are_not_known_to_a_percent() -> Non
     numbers = {"density": 1000.0, "E": 1e5, "poisson": 0.45, "damping": 4e-3}
     bar = words(sb.solid(mesh, name="bar", pinned=mesh.sets["x_min"], **numbers), "bar_E", [12], sb.Solver(h=5e-3))
     assert (bar["bar_poisson"], bar["bar_damping"], bar["bar_density"]) == ("0.05", "10 %", "1 %")
+    scene = sb.Scene("arm")
+    arm = sb.add_arm(scene, "arm", mass=0.4, first_moment=0.08, inertia=0.02, length=0.3, angle=0.9, drag=1e-3)
+    scene.set_drag(linear=1e-3)
+    swung = words(scene, "arm_inertia", [arm.end], sb.Solver(h=5e-3))
+    assert (swung["arm_drag"], swung["unnamed"], swung["arm_mass"]) == ("10 %", "10 %", "1 %")
     drawn = dragged(friction=0.3)
     rope = words(drawn, "rope_EI", [int(p) for p in drawn.ropes["rope"].particles[3:6]], DRAGGING)
     assert (rope["table_friction"], rope["rope_length"]) == ("10 %", "1 %")

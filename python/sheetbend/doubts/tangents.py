@@ -70,10 +70,10 @@ def tangents(
 
 
 def residuals(problem: FitProblem, u: Array, i: int, e: Experiment, corrected: Array | None = None) -> Array:
-    """(rows,) of the i-th experiment at u (free,), on another scene with its quantities.
+    """(rows,) residuals of the i-th experiment at u (free,), on another scene that has the same quantities.
 
     Args:
-        e: the experiment with that scene.
+        e: the experiment on that scene.
         corrected: the experiment's corrections there (`FitProblem.corrections`).
 
     Raises:

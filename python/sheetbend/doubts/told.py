@@ -29,7 +29,7 @@ from .lead import Lead, leads
 from .losses import LOSSES
 from .sensor_errors import sensor_errors
 from .tangents import Input, Part, tangents
-from .told_inputs import AXES, STEPS, gravity_turns, told_inputs
+from .told_inputs import AXES, OF_LOSSES, STEPS, gravity_turns, told_inputs
 from .told_inputs import GROUPS as OF_INPUTS
 
 Rows = slice | NDArray[np.bool_]
@@ -55,9 +55,11 @@ GROUPS: Mapping[str, tuple[str, tuple[float, str]]] = {
 }
 """Told numbers that are no quantities, by the name under which a standard deviation is given: unit ("" where it is
 relative) and step."""
-ESTIMATED, GUESSED = 0.1, 0.05
-"""Step of a given loss or friction, relative, and of Poisson's ratio or a restitution: numbers that are rather
-estimated than measured. A Poisson's ratio of 0.3, told as 0.45, made the E of a swinging bar 10 % too large."""
+TAKEN = (*LOSSES, "_drag", "_friction", "_dissipation")
+"""Ends of the names of quantities that take energy, those of bodies, arms and contacts among them."""
+GUESSED = 0.05
+"""Step of Poisson's ratio and of a restitution: as losses, they are estimated rather than measured. A Poisson's ratio
+of 0.3, told as 0.45, made the E of a swinging bar 10 % too large."""
 LATER, SLOWER, LARGER = "recording delay", "frame rate", "size of the recording"
 ASIDE, DRAFT, BESIDE = "place of the drive", "draft along", "offset of markers"
 _NONE = np.zeros(0)
@@ -196,7 +198,7 @@ def _collect(
 def _step(q: Quantity, value: float, log: bool) -> tuple[bool, float, str] | None:
     """Whether the step of a told quantity is relative, the step, and the step in words; None where none makes sense."""
     if log:
-        unsure = max(q.unsure, ESTIMATED if q.name.endswith((*LOSSES, "_friction")) else 0.0)
+        unsure = max(q.unsure, OF_LOSSES[0] if q.name.endswith(TAKEN) else 0.0)
         return True, unsure, f"{100 * unsure:g} %"
     if q.name.endswith(("_poisson", "_restitution")):
         return False, GUESSED, f"{GUESSED:g}"

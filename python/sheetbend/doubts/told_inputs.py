@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from .tangents import Input
 AXES = "xyz"
 DEGREE, MILLIMETER = math.pi / 180.0, 1e-3
 PERCENT = (0.01, "1 %")
+OF_LOSSES = (0.1, "10 %")  # and of friction: such numbers are estimated rather than measured
 STEPS = {"rad": (DEGREE, "1 degree"), "m": (MILLIMETER, "1 mm"), "s": (1e-3, "1 ms")}
 GROUPS: Mapping[str, tuple[str, tuple[float, str]]] = {
     "gravity": ("rad", STEPS["rad"]),
@@ -190,7 +191,8 @@ def _unnamed(e: Experiment) -> Iterator[ToldInput]:
         values = base[array] * (free if len(base[array]) == len(free) else 1.0)
         at = np.flatnonzero(values)
         if len(at):
-            yield _made("unnamed", words, (array, at, values[at]))
+            step = OF_LOSSES if array.startswith(("drag", "air")) else PERCENT
+            yield replace(_made("unnamed", words, (array, at, values[at])), step=step)
 
 
 def _weights(e: Experiment, inputs: Array) -> Iterator[ToldInput]:

@@ -155,7 +155,8 @@ def fit(
             - relative: "gravity_size", "recording_clock" (its frame rate), "recording_size", "drive_size" (how far the
               scene is driven), "load_size" (of forces that are no quantities), "start_speed", "unnamed" (masses, drag,
               air and pressures of a scene built by hand that are no quantities), "isotropy" (weft over warp, and other
-              second stiffnesses, where only the first is given);
+              second stiffnesses, where only the first is given), "dry_friction" (of hinges that have viscosity alone,
+              as a share of what that takes);
             - of force sensors: "force_size" (relative), "force_zero" in N, "torque_zero" in N m, "force_direction" in
               rad, "force_delay" in s.
 

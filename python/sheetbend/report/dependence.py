@@ -15,8 +15,9 @@ from ..quantities.wording import short
 from ..result.estimate import Estimate, Premise
 from ..result.result import FitData
 
-PLAUSIBLE = "1 %, 1 mm, 1 ms, 0.25 degrees or 0.2 m/s of the air"
-"""The plausible error in most given values; in clocks and sizes it is less (`doubts.told.GROUPS`)."""
+PLAUSIBLE = "1 % (losses: 10 %), 1 mm, 1 ms, 0.25 degrees or 0.2 m/s of the air"
+"""The plausible error in most given values; in clocks and sizes it is less, in ratios of stiffnesses and in a dry
+friction that the model lacks it is more (`doubts.told.GROUPS`)."""
 LEVEL = 0.25
 """The plausible error in a direction, in degrees: what a spirit level or an eye along an edge leaves. In other values
 it is the error whose effect the report shows."""
