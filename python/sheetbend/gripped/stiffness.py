@@ -55,7 +55,7 @@ def stiffness_section(result: FitResult) -> Section | None:
     after, softest, EI = tangent_stiffness(result), softest_place(result), _estimate(result, "EI")
     if EI is None or (after is None and softest is None):
         return None
-    rows = [("EI at small strain", EI.value, EI.lower, EI.upper)]
+    rows = [("EI of the whole rope" if after is None else "EI at small strain", EI.value, EI.lower, EI.upper)]
     notes = []
     if after is not None:
         rows.append(("EI where the rope slides inside", *after))
