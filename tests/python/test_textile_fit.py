@@ -70,6 +70,32 @@ def test_intervals_hold_the_truth_for_nineteen_of_twenty_laboratories():
     assert 20 <= outside <= 75  # of 1200: 60 where no misfit widens them, fewer by what it does
 
 
+def test_a_misfit_widens_what_rests_on_its_test_alone():
+    """A pull of one strip that no law fits made a weight that was known to 2 % uncertain by a factor of 4.7."""
+    off = [6.0, -8.0, 5.0, -4.0]
+    strip = [replace(measured(product(warp=1.0), off=k), specimens={"strip": 1.0}) for k in off]
+    weights = {"a": 19.9, "b": 20.0, "c": 20.1}  # in hundredths, as `product` reads
+    weighed = Measured.of_specimens(weights, name="weight", test=product(density=1.0), error=0.4)
+    found = textile.fit_fabric([*strip, weighed], START, ["warp", "density"])
+    warp, density = (math.log(e.upper / e.lower) / 2 for e in found.estimates)
+    assert density == approx(1.96 * 0.02, rel=0.05)
+    residuals = np.array(off) - np.mean(off)
+    scatter = math.sqrt(float(residuals @ residuals) / 3)
+    assert warp == approx(1.96 * 0.01 * scatter / 2, rel=0.05)
+    assert "widened by the misfit of the tests" in " ".join(str(found).split())
+
+
+def test_scatter_of_few_specimens_counts_by_its_share():
+    """The scatter of two strips is Student's t of one degree of freedom, unless most of the error is the machine's."""
+    few = {"1": 99.0, "2": 101.0}
+    test = lambda fabric: Reading(fabric.shear, "N/m", {"cloth_shear": 1.0}, "N/m", 1.0)  # noqa: E731
+    for error, quantile in ((1e-6, 12.706), (20.0, 1.96)):
+        given = [Measured.of_specimens(few, name="shear", test=test, error=error)]
+        (estimate,) = textile.fit_fabric(given, START, ["shear"]).estimates
+        reach = math.log(estimate.upper / estimate.lower) / 2
+        assert reach == approx(quantile * given[0].sigma / 100.0, rel=5e-3)
+
+
 def test_a_value_below_its_uncertainty_keeps_digits():
     """The table said 0.0000 N m, in 0.0000 to 0.0053."""
     found = textile.fit_fabric([measured(product(shear=1.0), 2.0)], START, ["shear"])

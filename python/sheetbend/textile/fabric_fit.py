@@ -29,6 +29,7 @@ _UNITS = {"density": "kg/m^2", "warp": "N/m", "weft": "N/m", "shear": "N/m", "po
 _BLIND = (
     2.0 / 30.0
 )  # sigmas that a number moves all readings by, per e-fold or per scale: less, and they do not contain it
+_FREEDOM = 1e-3  # of readings: what has less is fitted whatever it reads
 _OPEN = math.log(1e3)  # of a number on a log scale: not known to this factor, it is open
 
 
@@ -135,7 +136,9 @@ class FabricFit:
             size = "none is left: as many numbers were found as there are readings"
         note = (
             "misfit",
-            f"{size}; intervals are widened by its root" if _widening(self.misfit, self.freedom) > 1 else size,
+            f"{size}; intervals are widened by the misfit of the tests that they rest on"
+            if _contradict(self.misfit, self.freedom)
+            else size,
         )
         left_out = tuple(("left out", told) for told in dict.fromkeys(m.note for m in self.measured) if told)
         return (
@@ -152,9 +155,9 @@ def _figures(e: Estimate) -> list[str]:
     return figures(numbers, e.half_width)
 
 
-def _widening(misfit: float, freedom: int) -> float:
-    """The factor by which intervals are widened where readings contradict each other (Birge 1932)."""
-    return math.sqrt(max(1.0, misfit / freedom)) if freedom > 0 else 1.0
+def _contradict(misfit: float, freedom: float) -> bool:
+    """Whether readings leave more than their sigmas allow."""
+    return freedom > _FREEDOM and misfit > freedom
 
 
 @one_blas_thread()
@@ -162,10 +165,11 @@ def fit_fabric(measured: Sequence[Measured], start: Fabric, free: Sequence[str])
     """Find numbers of a fabric whose tests read what the laboratory has read: least squares, weighted by sigma.
 
     Readings fall into one sum whatever their tests are, so numbers that share a test (shear in a bias extension) are
-    found together, and what the readings do not tell is named. Intervals come from the readings' own sigmas; where the
-    misfit is larger than chance has it they are widened by its root (Birge 1932). Errors of one specimen go together:
+    found together, and what the readings do not tell is named. Intervals come from the readings' own sigmas. Where the
+    misfit is larger than chance has it, the sigmas of each test are widened by the root of its own misfit (Birge 1932),
+    so that a pull that fits poorly leaves the interval of the weight as it is. Errors of one specimen go together:
     where readings name their specimens, each specimen counts as a whole (errors clustered by specimen; Liang and Zeger
-    1986), with Student's t of their number.
+    1986), with Student's t of as many degrees of freedom as the errors of a number have (Welch 1947).
 
     Args:
         measured: at least one.
@@ -272,37 +276,85 @@ def estimates_of(
     jacobian = jacobian * seen
     space = null_space(jacobian, parameters.free, [p.log for p in free])
     kept = [column for column in range(len(free)) if column not in space.pivots]
-    by_errors = np.linalg.pinv(jacobian[:, kept]) @ _errors(measured)
-    factor = _quantile(measured) * _widening(float(r @ r), len(r) - space.rank)
+    inverse = np.linalg.pinv(jacobian[:, kept])
+    left = 1.0 - np.einsum("ij,ji->i", jacobian[:, kept], inverse)  # of the freedom of each reading
+    half_widths = _half_widths(measured, inverse, _widening(measured, r, left))
     estimates = []
     for column, p in enumerate(free):
         reach = math.inf
         if column in space.determined:
-            reach = factor * float(np.linalg.norm(by_errors[kept.index(column)]))
+            reach = float(half_widths[kept.index(column)])
         told = [gauge.words for gauge in space.gauges if p.name in gauge.members]
         estimates.append(_estimate(p, u[column], reach, "; ".join(told)))
     return tuple(estimates), space.rank
 
 
-def _errors(measured: Sequence[Measured]) -> Array:
-    """(readings, sources) sigmas that each source of error moves a reading by: a specimen moves all readings that it is
-    part of, and what sigma has beyond the scatter of the specimens moves its reading alone."""
-    names = list(dict.fromkeys(name for m in measured for name in m.specimens))
-    found = np.zeros((len(measured), len(names) + len(measured)))
+def _tests(measured: Sequence[Measured]) -> list[int]:
+    """The test of each reading, by the first reading of it: readings of the same specimen are of one test."""
+    tests = list(range(len(measured)))
+    for row, m in enumerate(measured):
+        for other in range(row):
+            if m.specimens.keys() & measured[other].specimens.keys():
+                tests = [tests[other] if test == tests[row] else test for test in tests]
+    return tests
+
+
+def _widening(measured: Sequence[Measured], r: Array, left: Array) -> Array:
+    """(readings,) factors of the sigmas, those of each test alike: the root of what it leaves over what chance does
+    (Birge 1932), where readings contradict each other.
+
+    Args:
+        left: (readings,) of the freedom of each reading: 1 less its leverage.
+    """
+    factors = np.ones(len(r))
+    if _contradict(float(r @ r), float(left.sum())):
+        tests = np.array(_tests(measured))
+        for test in set(tests.tolist()):
+            own = tests == test
+            freedom = float(left[own].sum())
+            if freedom > _FREEDOM:
+                factors[own] = math.sqrt(max(1.0, float(r[own] @ r[own]) / freedom))
+    return factors
+
+
+def _half_widths(measured: Sequence[Measured], inverse: Array, widening: Array) -> Array:
+    """(numbers,) half-widths of 95 % intervals, of the optimizer's numbers.
+
+    Errors of one specimen go together. What the scatter of a few specimens tells counts by Student's t, with the
+    degrees of freedom that belong to the errors of a number (Welch 1947, Satterthwaite 1946).
+
+    Args:
+        inverse: (numbers, readings) how each number follows a reading, in its sigmas.
+    """
+    every, scattered = np.zeros((2, len(inverse)))
+    tests = np.array(_tests(measured))
+    for test in set(tests.tolist()):
+        own = np.flatnonzero(tests == test)
+        shared, single = _errors([measured[row] for row in own])
+        moved = inverse[:, own] * widening[own]
+        scatter = ((moved @ shared) ** 2).sum(axis=1)
+        every += scatter + ((moved * single) ** 2).sum(axis=1)
+        if shared.shape[1] > 1:
+            scattered += scatter**2 / (shared.shape[1] - 1)
+    few = scattered > 0.0
+    quantile = np.full(len(every), NORMAL)
+    if few.any():
+        quantile[few] = require("scipy.special", "fit").stdtrit(every[few] ** 2 / scattered[few], 0.975)
+    return np.asarray(quantile * np.sqrt(every))
+
+
+def _errors(measured: Sequence[Measured]) -> tuple[Array, Array]:
+    """How many sigmas each source of error moves readings of one test by: (readings, specimens) a specimen, which moves
+    all readings that it is part of; and (readings,) what sigma has beyond the scatter of the specimens."""
+    names = list(dict.fromkeys(name for m in measured for name in m.specimens if len(m.specimens) > 1))
+    shared = np.zeros((len(measured), len(names)))
     for row, m in enumerate(measured):
         count = len(m.specimens)
-        values = np.array(list(m.specimens.values()), dtype=float)
         if count > 1:
+            values = np.array(list(m.specimens.values()), dtype=float)
             parts = (values - values.mean()) / (m.sigma * math.sqrt(count * (count - 1)))
-            found[row, [names.index(name) for name in m.specimens]] = parts
-        found[row, len(names) + row] = math.sqrt(max(0.0, 1.0 - float((found[row] ** 2).sum())))
-    return found
-
-
-def _quantile(measured: Sequence[Measured]) -> float:
-    """Two-sided 95 %: normal, or of Student's t where scatter is that of a few specimens."""
-    counts = [len(m.specimens) for m in measured if len(m.specimens) > 1]
-    return float(require("scipy.special", "fit").stdtrit(min(counts) - 1, 0.975)) if counts else NORMAL
+            shared[row, [names.index(name) for name in m.specimens]] = parts
+    return shared, np.sqrt(np.maximum(0.0, 1.0 - (shared**2).sum(axis=1)))
 
 
 def _estimate(p: Parameter, internal: float, reach: float, gauges: str) -> Estimate:
