@@ -53,13 +53,35 @@ def test_a_rope_on_a_table(tmp_path: Path, held: str, seen: str) -> None:
     assert content["parameters"]["table_friction"]["lower"] < contact["friction"] < takes.FRICTION
 
 
+@pytest.mark.parametrize("up", [1, -1], ids=["y up", "y down"])
 @pytest.mark.parametrize("held", ["pinned", "hand"])
-def test_a_rope_that_swings_before_one_camera_is_not_on_a_table(tmp_path: Path, held: str) -> None:
-    """It moves in x and y alone, too; but its outer half falls."""
+def test_a_rope_that_swings_before_one_camera_is_not_on_a_table(tmp_path: Path, held: str, up: int) -> None:
+    """It moves in x and y alone, too; but its outer half falls, also where y points down as in an image."""
     recording = takes.let_go(clamped=False, seconds=1.0) if held == "pinned" else takes.rope_in_hand("one", seconds=2.0)
-    x = recording.positions[..., [0, 2, 1]] * [1, 1, 0]
+    x = recording.positions[..., [0, 2, 1]] * [1, up, 0]
     said, content = drafted(tmp_path, sb.Recording(x, recording.times, recording.markers))
     assert said["kind"] == "a rope" and "collider" not in content["scene"]
+    assert content["scene"]["gravity"] == [0.0, -9.81 * up, 0.0]
+
+
+@pytest.mark.parametrize("named", [True, False], ids=["named", "unnamed"])
+def test_a_rope_between_two_hands_before_one_camera(tmp_path: Path, named: bool) -> None:
+    """What hangs between two hands does not fall, as if on a table: only the hands' names, or --up, tell."""
+    t, share = np.arange(150) / 50, np.linspace(0.0, 1.0, 9)
+    ends = [[0.1 * np.sin(3.0 * t + k) + 0.5 * k, 0.05 * np.sin(2.0 * t + k), 0.0 * t] for k in (0, 1)]
+    left, right = (np.stack(end, axis=1)[:, None] for end in ends)
+    sag = 0.8 * (share * (1.0 - share))[:, None] * np.array([0.0, 1.0, 0.0])
+    x = left + share[:, None] * (right - left) - sag
+    x[..., :2] += 5e-4 * np.random.default_rng(0).standard_normal((*x.shape[:2], 2))
+    names = [f"r{k}" for k in range(9)]
+    names[0], names[-1] = ("left_hand", "right_hand") if named else (names[0], names[-1])
+    said, content = drafted(tmp_path, sb.Recording(x, t, names))
+    if not named:
+        assert said["kind"] == "a rope on a table"
+        assert "it does not fall along y: give --up y if it hangs, as between two hands" in said["seen"]
+        (tmp_path / "take.toml").unlink()
+        said, content = drafted(tmp_path, sb.Recording(x, t, names), "--up", "y")
+    assert said["kind"] == "a rope" and content["scene"]["gravity"] == [0.0, -9.81, 0.0]
 
 
 def test_a_rope_that_two_hands_move_over_a_table(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What the free end of a rope in a recording tells: a mass there, such as a plug on a cable, and which way is down.
+"""A mass at the free end of a rope in a recording, such as a plug on a cable.
 
 A flexible rope carries no force across itself, so what is beyond a point of it, rope and mass, balances across its
 direction there: rho integral(a - g) ds + m (a_end - g) has no part across the tangent. Only m/rho is unknown.
@@ -18,7 +18,6 @@ Array = np.ndarray
 FEWEST, FRAMES = 5, 20  # markers on the rope, and frames in which all are seen, at least
 MOVES = 0.3  # m/s^2, root mean square across the rope, at least: less is hidden by noise
 COUNTS = 0.05  # of the mass of the rope: a smaller one cannot be told from markers and stiffness
-SLANTS = 0.1  # of gravity, at least, across the rope: less does not tell whether it acts
 AGREE = 0.25  # of the median: how far apart the quartiles of what the markers tell may be
 
 
@@ -61,26 +60,6 @@ def end_load(s: Seen, way: tuple[int, ...]) -> float | None:
         told.append(-float(np.sum(of_rope * of_mass) / np.sum(of_mass**2)))
     low, load, high = np.quantile(told, [0.25, 0.5, 0.75])
     return float(load) if load > COUNTS * arc[-1] and high - low < AGREE * load else None
-
-
-def feels_gravity(s: Seen, way: tuple[int, ...]) -> float:
-    """How much of gravity the outer half of a rope shows across itself: 1 of a flexible rope in the air, about 0 of one
-    on a table that a camera sees from above; 1 where the motion does not tell.
-
-    Args:
-        way: markers in order from where the rope is held to its free end.
-    """
-    moving = _moving(s, way)
-    if moving is None:
-        return 1.0
-    x, acceleration = moving
-    arc = np.concatenate([[0.0], np.cumsum([s.apart[a, b] for a, b in pairwise(way)])])
-    k = len(way) // 2
-    moved, falls = (across(x, k, beyond(v, arc, k)) for v in (acceleration, np.broadcast_to(s.gravity, x.shape)))
-    all_of = ((arc[-1] - arc[k]) * np.linalg.norm(s.gravity)) ** 2
-    if np.mean(np.sum(falls**2, axis=1)) < SLANTS**2 * all_of:
-        return 1.0
-    return float(np.sum(moved * falls) / np.sum(falls**2))
 
 
 def _moving(s: Seen, way: tuple[int, ...]) -> tuple[Array, Array] | None:

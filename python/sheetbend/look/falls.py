@@ -1,7 +1,8 @@
-"""Whether a rope that moves falls upward, with the way up that is taken: then it is the other one.
+"""Which way the outer half of a rope that moves falls: down, up, or not at all.
 
 A flexible rope carries no force across itself. So what is beyond a point of it balances across its direction there, as
-in `end_load`: without a mass at the end, the integral of a - g has no part across it. With g upside down it has one.
+in `end_load`: without a mass at the end, the integral of a - g has no part across it. With g upside down it has one,
+and so it has with g in the plane of a table, which holds the rope against it.
 """
 
 from __future__ import annotations
@@ -16,24 +17,26 @@ from .end_load import FEWEST, FRAMES, across, beyond
 from .seen import REST, Seen
 
 Array = np.ndarray
-CLEARLY = 0.5  # of what is left with the way up that is taken: less is left with the other one
+CLEARLY = 0.5  # of what is left with the way that is taken for down: less is left with another one
 
 
-def falls_upward(s: Seen, order: tuple[int, ...]) -> bool:
-    """Whether gravity the other way explains much better how a rope moves, whichever end is free."""
+def falls(s: Seen, order: tuple[int, ...]) -> int:
+    """1 if a rope falls the way that is taken for down, whichever of its ends is free, or if the motion does not tell;
+    -1 if gravity the other way explains much better how it moves; 0 if none does, as on a table seen from above."""
     t = s.recording.times
     x = interpolate(t, s.recording.positions[:, list(order)], t, "cubic", np.inf)
     whole = np.isfinite(x).all(axis=(1, 2))  # all but frames at both ends
     t, x = t[whole], x[whole]
     moving = t > s.recording.times[0] + s.rest
     if len(order) < FEWEST or moving.sum() < FRAMES:
-        return False
+        return 1
     x, speed = smoothed(t, x, REST / 2)
     _, acceleration = smoothed(t, speed, REST / 2)
     arc = np.concatenate([[0.0], np.cumsum([s.apart[a, b] for a, b in pairwise(order)])])
-    ways = [(x[moving], acceleration[moving], arc), (x[moving, ::-1], acceleration[moving, ::-1], arc[-1] - arc[::-1])]
-    down, up = (min(_left(*way, sign * s.gravity) for way in ways) for sign in (1.0, -1.0))
-    return bool(up < CLEARLY * down)
+    ends = [(x[moving], acceleration[moving], arc), (x[moving, ::-1], acceleration[moving, ::-1], arc[-1] - arc[::-1])]
+    left = {way: min(_left(*end, way * s.gravity) for end in ends) for way in (1, 0, -1)}
+    best = min(left, key=lambda way: left[way])
+    return best if left[best] < CLEARLY * left[1] else 1
 
 
 def _left(x: Array, acceleration: Array, arc: Array, gravity: Array) -> float:

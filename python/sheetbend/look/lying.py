@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .end_load import feels_gravity
+from .falls import falls
+from .held import gripping, parts
 from .line import plane
 from .seen import Seen
 
@@ -15,7 +16,6 @@ Array = np.ndarray
 BAND = 0.01  # of the length: how high above the lowest markers counts as lying, and six times the noise at least
 SHARE = 0.6  # of all that is seen, so low
 SLIDES = 3.0  # times this band: how far markers move along the floor
-FALLS = 0.5  # of gravity: so much the outer half of a rope in the air shows at least
 RADIUS = 0.005  # m, taken as the rope's
 
 
@@ -59,10 +59,11 @@ def _table(s: Seen, order: tuple[int, ...]) -> Table | None:
 
 
 def _from_above(s: Seen, order: tuple[int, ...]) -> Seen:
-    """The same seen from above, where nothing tells which way is up and the rope moves in one plane without falling."""
+    """The same seen from above, where nothing tells which way is up and the rope moves in one plane without falling.
+    A rope whose two ends are held does not fall in the air either."""
     x = s.recording.positions[:, list(order)]
     normal = plane(x, float(s.apart[np.ix_(order, order)].max()))
     if s.up_by != "guess" or normal is None or 1.0 not in normal or normal[s.up]:
         return s
-    falls = max(feels_gravity(s, order), feels_gravity(s, order[::-1]))
-    return s if falls > FALLS else replace(s, up=normal.index(1.0))
+    both_held = len(parts(s)[0]) == 2 or {order[0], order[-1]} <= gripping(s)
+    return s if both_held or falls(s, order) else replace(s, up=normal.index(1.0))

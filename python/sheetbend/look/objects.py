@@ -83,7 +83,7 @@ def _check_one_pivot(s: Seen) -> None:
     """
     moving = [k for k in range(len(s.recording.markers)) if k not in s.still]
     keeps = np.nanstd(distances(s.recording.positions), axis=0) <= np.maximum(RIGID * s.noise, 1e-3 * s.apart)
-    if not s.still or not keeps[np.ix_(moving, s.still)].any(axis=1).all():
+    if s.sheet or not s.still or not keeps[np.ix_(moving, s.still)].any(axis=1).all():
         return
     found, left = list[Group](), list(moving)
     while left:

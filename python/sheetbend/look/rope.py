@@ -11,7 +11,7 @@ import numpy as np
 from ..arrays.timeseries import mean_position
 from ..errors import RecordingError
 from .end_load import free_end
-from .falls import falls_upward
+from .falls import falls
 from .held import Hands, Held, held, parts
 from .line import snapped, tangent
 from .lying import table_under
@@ -47,7 +47,9 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     check_one_rope(s, order)
     table = table_under(s, order)
     if table is not None and table.seen.up != s.up:
-        return describe([replace(take, seen=replace(take.seen, up=table.seen.up)) for take in takes], measured)
+        lying = describe([replace(take, seen=replace(take.seen, up=table.seen.up)) for take in takes], measured)
+        hangs = f"it does not fall along {'xyz'[s.up]}: give --up {'xyz'[s.up]} if it hangs, as between two hands"
+        return None if lying is None else lying._replace(notes=[*lying.notes, hangs])
     hanging = measured.weight is not None
 
     def holding(s: Seen, hands: Hands, order: tuple[int, ...]) -> Held:
@@ -56,12 +58,13 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     found = holding(s, hands, order)
     if len(found.order) < 3:
         return None
-    if s.up_by == "guess" and table is None and not s.static and _upside_down(s, found, order):
+    guessed = s.up_by == "guess" and s.recording.gravity is None  # and not turned already
+    if guessed and table is None and not s.static and _upside_down(s, found, order):
         turned = describe([replace(take, seen=take.seen.upside_down()) for take in takes], measured)
         up = "xyz"[s.up]
         stands = f"with {up} up, it would stand on what holds it or fall upward: give --up {up} if it stands there"
         return None if turned is None else turned._replace(up=f"-{up}", notes=[*turned.notes, stands])
-    if len(takes) == 1 and (slip := slid(s, found)) is not None:
+    if len(takes) == 1 and table is None and (slip := slid(s, found)) is not None:
         return _held_fast(takes[0], measured, slip)
     pushed = None
     if s.rest and not s.static and not found.grips and len(takes) == 1:
@@ -77,7 +80,7 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
 
 
 def _upside_down(s: Seen, found: Held, order: tuple[int, ...]) -> bool:
-    return _stands(s, found) or (_flies(s, found) and falls_upward(s, order))
+    return _stands(s, found) or (_flies(s, found) and falls(s, order) < 0)
 
 
 def _stands(s: Seen, found: Held) -> bool:
