@@ -1,8 +1,8 @@
 """Dry friction in hinges that a model lets lose energy by viscosity alone.
 
 A short recording shows how much energy a hinge loses, and hardly by what: a pendulum of three swings with 0.3 mN m of
-dry friction was fitted with a viscosity 30 % too large, "identified" to 0.6 %, and with residuals like noise. So a fit
-says what it would move if 0.3 of the loss were dry friction. Where the residuals ask for some, it is named.
+dry friction was fitted with a viscosity 30 % too large, "identified" to 0.6 %, and with residuals like noise. So a
+report tells what would move if 0.3 of the loss were dry friction. Where the residuals ask for some, it is named.
 
 A hinge with dry friction may stick, so no tangent at zero tells what it changes. While the hinge slides, the torque is
 proportional to it, and one simulation with a little of it does.
@@ -42,7 +42,7 @@ class Dry:
         label: whose it is.
         column: what as much loss by dry friction as by viscosity would change of the experiment's residuals, to first
             order.
-        says: what a share of it says of the model.
+        says: words for a size of it, as a share of the viscous loss.
     """
 
     label: str

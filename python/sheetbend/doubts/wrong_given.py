@@ -48,9 +48,9 @@ MUCH = 2.0
 """Times the noise, and the told sigma's where that is more: what a fit that misses much leaves beyond it. Residuals are
 1.7 sigma then, or more."""
 FELT = 0.05
-"""Of the number of residuals, in the noise's variance: a fit that leaves less beyond noise is not asked for what its
-model lacks. A knot of 1.3 g at the end of a rope that is drawn over a table leaves 0.13 to 0.2, and made the friction
-65 % too large (measured)."""
+"""Of the sum of squares that sigma allows, which is the number of residuals: a fit that leaves less beyond noise is not
+asked for what its model lacks. A knot of 1.3 g at the end of a rope that is drawn over a table leaves 0.13 to 0.2, and
+made the friction 65 % too large (measured)."""
 OWN = (LATER, SLOWER, LARGER, FARTHER, ASIDE)  # errors that each recording has of its own
 FAR = 9.0
 """Times the noise, what is left beyond it: residuals are more than three times the noise. Where nothing explains that,
@@ -175,7 +175,8 @@ def _asked(
         left = float(r[mine] @ r[mine]) - noise_in(r[:data], layout, mine[:data])
         if not left > 0.0:
             continue
-        much, allowed = left > FELT * data, max(float(r[mine] @ r[mine]) - left, float(np.count_nonzero(mine)))
+        rows = float(np.count_nonzero(mine))
+        much, allowed = left > FELT * rows, max(float(r[mine] @ r[mine]) - left, rows)
         without_number = [*lacking.of(group), *lost_frames(problem, q, r, told)] if much else []
         tried = list(_directions(problem, [*told, *without_number], group))
         asked, sure = likely(tried, mine, left, MOST), True
