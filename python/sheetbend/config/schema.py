@@ -228,14 +228,14 @@ class ParameterSection(Section):
 class GivenSection(Section):
     """How uncertain a number is that the fit takes as given. One table each: [given.NAME], NAME being a quantity that
     is not fitted, "gravity", "clamp_direction", "grip_direction" (of each grip against its poses, or of each of several
-    clamps), "collider_direction" or "load_direction" (directions, rad), "clamps", "lead" (how far a rope sticks out of
-    what holds it), "markers", "marker_offset" (from a rope's axis) or "drive_place" (places, m), "recording_delay" (s),
-    "marker_mass" (of each that the model does not have, kg), "draft" (velocity of the air along each axis, m/s), of
-    force sensors "force_size" (relative), "force_zero" (N), "torque_zero" (N m), "force_direction" (rad) and
-    "force_delay" (s), "gravity_size", "recording_clock" (its frame rate), "recording_size", "drive_size" (how far what
-    drives the scene moves), "load_size" (forces that are no quantities), "start_speed" (how fast a motion starts),
-    "unnamed" (masses, drag, air and pressures of a scene built by hand that are no quantities), "dry_friction" (of
-    hinges that have viscosity alone, as a share of its loss) or "isotropy" (weft over warp, and other second
+    clamps), "collider_direction" or "load_direction" (directions, rad), "clamps", "lead" (free length: how far a rope
+    sticks out of what holds it), "markers", "marker_offset" (from a rope's axis) or "drive_place" (places, m),
+    "recording_delay" (s), "marker_mass" (of each that the model does not have, kg), "draft" (velocity of the air along
+    each axis, m/s), of force sensors "force_size" (relative), "force_zero" (N), "torque_zero" (N m), "force_direction"
+    (rad) and "force_delay" (s), "gravity_size", "recording_clock" (its frame rate), "recording_size", "drive_size" (how
+    far what drives the scene moves), "load_size" (forces that are no quantities), "start_speed" (how fast a motion
+    starts), "unnamed" (masses, drag, air and pressures of a scene built by hand that are no quantities), "dry_friction"
+    (of hinges that have viscosity alone, as a share of its loss) or "isotropy" (weft over warp, and other second
     stiffnesses, where only the first is given; relative)."""
 
     sd: Finite = key(

@@ -148,8 +148,8 @@ def fit(
 
             - in rad: "gravity" (its direction), "clamp_direction", "grip_direction" (of each grip against its poses, or
               of each of several clamps), "collider_direction" and "load_direction" (each about each axis);
-            - in m: "clamps", "lead" (how far a rope sticks out of what holds it), "markers", "marker_offset" (from a
-              rope's axis), "drive_place";
+            - in m: "clamps", "lead" (free length: how far a rope sticks out of what holds it), "markers",
+              "marker_offset" (from a rope's axis), "drive_place";
             - in s: "recording_delay"; in kg: "marker_mass" (of each marker that has no mass in the model);
             - in m/s: "draft" (the velocity of the air along each axis);
             - relative: "gravity_size", "recording_clock" (its frame rate), "recording_size", "drive_size" (how far the
