@@ -4,6 +4,7 @@
 #include <map>
 
 #include "core/scalar/pivot.h"
+#include "core/solver/body_loops.h"
 #include "core/solver/ordering.h"
 
 namespace sheetbend {
@@ -15,7 +16,7 @@ bool pushes_in_impacts(const Scene& scene, const Member& m) {
 }
 
 // Numbers the rows, and finds who uses them and which meet.
-Assembly assembled(const Scene& scene, std::vector<Member> members) {
+Assembly assembled(const Scene& scene, std::vector<Member> members, double loop_pivot) {
   std::map<int, std::vector<Assembly::Use>> uses;
   int rows = 0;
   for (int i = 0; i < static_cast<int>(members.size()); ++i) {
@@ -34,7 +35,8 @@ Assembly assembled(const Scene& scene, std::vector<Member> members) {
             if (const int row = members[one.member].first_row + j, column = members[other.member].first_row + k;
                 column <= row)
               entries.emplace_back(row, column);
-  return {std::move(members), {rows, entries, true, redundant_pivot}, {uses.begin(), uses.end()}};
+  const FactorStructure structure(rows, entries, loop_pivot == 0.0, std::max(loop_pivot, redundant_pivot));
+  return {std::move(members), structure, {uses.begin(), uses.end()}};
 }
 
 }  // namespace
@@ -52,10 +54,12 @@ void assemble_balls(const Scene& scene, Plan& plan) {
       for (const int n : scene.groups[m.group].nodes(m.item))
         if (const auto at = ball_of.find(n); at != ball_of.end()) plan.assembly_of_ball[at->second] = own, any = true;
     if (!any) continue;
-    Assembly assembly = assembled(scene, members);
+    const double loop_pivot = closes_loop(scene, members) ? pivot_of_loop : 0.0;
+    Assembly assembly = assembled(scene, members, loop_pivot);
     if (!assembly.structure.banded()) {
       order_for_low_fill(scene, members);
-      assembly = assembled(scene, std::move(members));
+      if (loop_pivot > 0.0) order_bodies_first(scene, members);
+      assembly = assembled(scene, std::move(members), loop_pivot);
     }
     plan.assemblies.push_back(std::move(assembly));
   }
