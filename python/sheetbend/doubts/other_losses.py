@@ -263,7 +263,8 @@ def _lacks_damping(only: str) -> Says:
 
 def _lacks_yield(problem: FitProblem, name: str) -> Callable[[Array], Says]:
     held = held_stiffness(problem, name)
-    first = f"Fit {', '.join(held)} first: too large a given value looks alike. If not, give" if held else "Give"
+    given = f"Fit {', '.join(held)} first: a given value that is too large looks alike. If the friction stays, give"
+    first = given if held else "Give"
     return lambda _: (
         lambda names, less: (
             f"{names[0] if len(names) == 1 else 'the recordings'} may lose energy by friction inside {name}: with a "
