@@ -316,8 +316,10 @@ def same_bits(drawing: Drawn, rng: Draw) -> str:
 
 
 def gap(a: Array, b: Array) -> float:
-    """The largest difference over the largest number, worst frame."""
-    return max(float(np.abs(p - q).max() / max(np.abs(q).max(), 1e-9)) for p, q in zip(a, b, strict=True))
+    """The largest difference over the largest number, worst frame. Numbers that differences with the largest step know
+    to fewer digits than TOLERANCE asks for, by the rounding of positions of 0.1 m, are no larger than that."""
+    least = np.finfo(float).eps * 0.1 / (STEPS[0] * TOLERANCE)
+    return max(float(np.abs(p - q).max() / max(np.abs(q).max(), least)) for p, q in zip(a, b, strict=True))
 
 
 def judged(found: Derivatives, particles: int) -> str:
