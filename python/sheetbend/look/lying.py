@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .falls import falls
-from .held import gripping, parts
+from .held import BEYOND, gripping, parts
 from .line import plane
 from .seen import Seen
 
@@ -60,10 +60,12 @@ def _table(s: Seen, order: tuple[int, ...]) -> Table | None:
 
 def _from_above(s: Seen, order: tuple[int, ...]) -> Seen:
     """The same seen from above, where nothing tells which way is up and the rope moves in one plane without falling.
-    A rope whose two ends are held does not fall in the air either."""
+    One whose two ends are held, or a stiff one that swings in a clamp, does not fall in the air either."""
     x = s.recording.positions[:, list(order)]
     normal = plane(x, float(s.apart[np.ix_(order, order)].max()))
     if s.up_by != "guess" or normal is None or 1.0 not in normal or normal[s.up]:
         return s
     both_held = len(parts(s)[0]) == 2 or {order[0], order[-1]} <= gripping(s)
-    return s if both_held or falls(s, order) else replace(s, up=normal.index(1.0))
+    spread = [float(np.nanvar(x[:, end], axis=0).sum()) for end in (0, -1)]
+    clamped = min(spread) < BEYOND**2 * max(spread)
+    return s if both_held or clamped or falls(s, order) else replace(s, up=normal.index(1.0))
