@@ -3,6 +3,7 @@
 
 #include "core/scalar/dual.h"
 #include "core/solver/divergence.h"
+#include "core/solver/scenes.h"
 
 namespace sheetbend::testing {
 namespace {
@@ -107,10 +108,10 @@ TEST(Divergence, EnergyAtTheStartExplainsWhatItDrives) {
 TEST(Divergence, LanesArePlainNumbers) {
   Pack pack(1.0);
   pack.set(3, 2.0);
-  EXPECT_EQ(plain(pack, 3), 2.0);
-  EXPECT_EQ(plain(pack, 4), 1.0);
-  EXPECT_EQ(plain(Dual<double, 8>(3.0), 0), 3.0);
-  EXPECT_EQ(lanes_in<Pack>, Pack::lanes);
+  EXPECT_EQ(number_of(pack, 3), 2.0);
+  EXPECT_EQ(number_of(pack, 4), 1.0);
+  EXPECT_EQ(number_of(Dual<double, 8>(3.0), 0), 3.0);
+  EXPECT_EQ(scenes_of<Pack>, Pack::lanes);
 }
 
 }  // namespace
