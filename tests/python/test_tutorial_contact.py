@@ -20,7 +20,7 @@ def test_the_tutorial_runs_as_it_stands(tmp_path: Path, monkeypatch: pytest.Monk
     text = PAGE.read_text()
     (make,) = re.findall(r"```python\n(.*?)```", text, re.S)
     (configuration,) = re.findall(r"```toml\n(.*?)```", text, re.S)
-    (command,) = re.findall(r"```sh\nsheetbend (.*?)\n```", text)
+    drafting, command = re.findall(r"```sh\nsheetbend (.*?)\n```", text)
     monkeypatch.chdir(tmp_path)
     exec(compile(make, "tutorial", "exec"), {})
     Path("drag.toml").write_text(configuration)
@@ -39,3 +39,10 @@ def test_the_tutorial_runs_as_it_stands(tmp_path: Path, monkeypatch: pytest.Monk
     matplotlib.use("Agg")
     runpy.run_path(str(PAGE.with_suffix(".py")))
     assert Path("dragged_rope.png").stat().st_size > 10_000
+    for words in (drafting, "fit draft.toml --output draft"):
+        assert run(*words.split()).exit_code == 0
+    drafted = sb.FitResult.load("draft/fit.json")
+    for name, words, unit in (("table_friction", "friction of ", 1.0), ("rope_EI", r"EI of \(", 1e-4)):
+        value, half = (unit * float(number) for number in re.findall(words + r"([\d.]+) ± ([\d.]+)", text)[0])
+        assert drafted[name].value == pytest.approx(value, abs=0.3 * half), name
+        assert drafted[name].half_width == pytest.approx(half, rel=0.2), name
