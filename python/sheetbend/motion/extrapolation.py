@@ -93,6 +93,10 @@ class Extrapolated:
     def complex_step(self, inputs: ArrayLike, direction: ArrayLike, steps: Sequence[int], t0: float) -> Array:
         return self._sum(w * s.complex_step(inputs, direction, own, t0) for s, own, w in self._each(steps))
 
+    def redundant_constraints(self, inputs: ArrayLike, t0: float) -> list[int]:
+        """Those that any of the runs leaves out, ascending, with those that they follow from."""
+        return sorted({k for s, _ in self._runs for k in s.redundant_constraints(inputs, t0)})
+
     def jvp_batch(
         self, inputs: ArrayLike, inputs_dot: ArrayLike, steps: Sequence[int], t0: float, lengths: Sequence[int] = ()
     ) -> Array:
