@@ -276,7 +276,7 @@ def estimates_of(
     jacobian = jacobian * seen
     space = null_space(jacobian, parameters.free, [p.log for p in free])
     kept = [column for column in range(len(free)) if column not in space.pivots]
-    inverse = np.linalg.pinv(jacobian[:, kept])
+    inverse = np.asarray(np.linalg.pinv(jacobian[:, kept]), dtype=float)
     left = 1.0 - np.einsum("ij,ji->i", jacobian[:, kept], inverse)  # of the freedom of each reading
     half_widths = _half_widths(measured, inverse, _widening(measured, r, left))
     estimates = []
@@ -330,7 +330,7 @@ def _half_widths(measured: Sequence[Measured], inverse: Array, widening: Array) 
     tests = np.array(_tests(measured))
     for test in set(tests.tolist()):
         own = np.flatnonzero(tests == test)
-        shared, single = _errors([measured[row] for row in own])
+        shared, single = _errors([measured[int(row)] for row in own])
         moved = inverse[:, own] * widening[own]
         scatter = ((moved @ shared) ** 2).sum(axis=1)
         every += scatter + ((moved * single) ** 2).sum(axis=1)
