@@ -96,15 +96,18 @@ def test_a_rope_that_two_hands_move_over_a_table(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_fit_of_a_rope_on_a_table(tmp_path: Path) -> None:
-    """A finer mesh and a shorter substep made it, and the hand that drags and turns it is as noisy as the rope. With
-    this noise of the hand EI is 4 % too small, 2.1 standard deviations; with the hand's true motion 0.6 %."""
+    """A finer mesh and a shorter substep made it, and the hand that drags and turns it is as noisy as the rope.
+
+    With this noise of the hand EI is 4 % too small, by as much as its half-width, and what is not fitted is missed by
+    twice the noise; friction is doubtful for it. With the hand's true motion EI is 0.6 % too small.
+    """
     recording = takes.rope_on_table("body")
     drafted(tmp_path, recording, "--density", str(takes.DENSITY))
     result = run("fit", tmp_path / "take.toml", "--output", tmp_path / "out")
     assert result.exit_code in (0, 4), result.output
     found = sb.FitResult.load(tmp_path / "out/fit.json")
     for name, true in {"table_friction": takes.FRICTION, "rope_EI": takes.STIFF}.items():
-        assert abs(found[name].value - true) < (found[name].in_all or found[name].half_width), name
-        assert found[name].half_width < 0.2 * true, name
-    (own,) = found.recordings
-    assert own.held_out < 3e-3 and own.held_out < 0.1 * own.baseline
+        own = found[name]
+        assert abs(own.value - true) < (own.in_all or own.half_width) < 0.1 * true, name
+    (take,) = found.recordings
+    assert take.held_out < 0.05 * take.baseline
