@@ -278,7 +278,8 @@ def estimates_of(
     kept = [column for column in range(len(free)) if column not in space.pivots]
     inverse = np.asarray(np.linalg.pinv(jacobian[:, kept]), dtype=float)
     left = 1.0 - np.einsum("ij,ji->i", jacobian[:, kept], inverse)  # of the freedom of each reading
-    half_widths = _half_widths(measured, inverse, _widening(measured, r, left))
+    tests = _tests(measured)
+    half_widths = _half_widths(measured, tests, inverse, _widening(tests, r, left))
     estimates = []
     for column, p in enumerate(free):
         reach = math.inf
@@ -289,17 +290,17 @@ def estimates_of(
     return tuple(estimates), space.rank
 
 
-def _tests(measured: Sequence[Measured]) -> list[int]:
-    """The test of each reading, by the first reading of it: readings of the same specimen are of one test."""
+def _tests(measured: Sequence[Measured]) -> list[list[int]]:
+    """The readings of each test, by their numbers: readings of the same specimen are of one test."""
     tests = list(range(len(measured)))
     for row, m in enumerate(measured):
         for other in range(row):
             if m.specimens.keys() & measured[other].specimens.keys():
                 tests = [tests[other] if test == tests[row] else test for test in tests]
-    return tests
+    return [[row for row, test in enumerate(tests) if test == own] for own in dict.fromkeys(tests)]
 
 
-def _widening(measured: Sequence[Measured], r: Array, left: Array) -> Array:
+def _widening(tests: Sequence[Sequence[int]], r: Array, left: Array) -> Array:
     """(readings,) factors of the sigmas, those of each test alike: the root of what it leaves over what chance does
     (Birge 1932), where readings contradict each other.
 
@@ -308,16 +309,16 @@ def _widening(measured: Sequence[Measured], r: Array, left: Array) -> Array:
     """
     factors = np.ones(len(r))
     if _contradict(float(r @ r), float(left.sum())):
-        tests = np.array(_tests(measured))
-        for test in set(tests.tolist()):
-            own = tests == test
+        for own in tests:
             freedom = float(left[own].sum())
             if freedom > _FREEDOM:
                 factors[own] = math.sqrt(max(1.0, float(r[own] @ r[own]) / freedom))
     return factors
 
 
-def _half_widths(measured: Sequence[Measured], inverse: Array, widening: Array) -> Array:
+def _half_widths(
+    measured: Sequence[Measured], tests: Sequence[Sequence[int]], inverse: Array, widening: Array
+) -> Array:
     """(numbers,) half-widths of 95 % intervals, of the optimizer's numbers.
 
     Errors of one specimen go together. What the scatter of a few specimens tells counts by Student's t, with the
@@ -327,10 +328,8 @@ def _half_widths(measured: Sequence[Measured], inverse: Array, widening: Array) 
         inverse: (numbers, readings) how each number follows a reading, in its sigmas.
     """
     every, scattered = np.zeros((2, len(inverse)))
-    tests = np.array(_tests(measured))
-    for test in set(tests.tolist()):
-        own = np.flatnonzero(tests == test)
-        shared, single = _errors([measured[int(row)] for row in own])
+    for own in tests:
+        shared, single = _errors([measured[row] for row in own])
         moved = inverse[:, own] * widening[own]
         scatter = ((moved @ shared) ** 2).sum(axis=1)
         every += scatter + ((moved * single) ** 2).sum(axis=1)
