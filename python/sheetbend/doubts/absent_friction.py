@@ -84,10 +84,14 @@ def _bare(scene: Scene) -> Iterator[tuple[int, int, Group]]:
     dry = {tuple(row[:-1]) for g in scene.groups if g.kind in DRY.values() for row in g.particles.tolist()}
     first = at = 0
     for g in scene.groups:
-        ends = g.particles if g.kind == "hinge" else g.particles[:, :-1]
-        if g.kind in DRY and g.damped and not dry & set(map(tuple, ends.tolist())):
+        if g.kind in DRY and g.damped and not dry & set(map(tuple, _ends(g).tolist())):
             yield first, at, g
         first, at = first + len(g.particles), at + g.rest.size
+
+
+def _ends(g: Group) -> Array:
+    """(hinges, nodes) of a viscous group: what turns, without the dial of a hinge between bodies."""
+    return g.particles if g.kind == "hinge" else g.particles[:, :-1]
 
 
 def _turned(e: Experiment, times: Array, values: dict[str, float]) -> dict[str, Array]:
@@ -112,12 +116,11 @@ def _with_friction(scene: Scene, g: Group, numbers: Array, angle: Array, torque:
     made._hidden.extend(at, np.zeros((count, 3)), np.ones(count))
     sets = np.arange(-1 - scene.hidden_count, -1 - made.hidden_count, -1)
     made.pinned = scene.pinned | set(sets.tolist())
-    ends = g.particles if g.kind == "hinge" else g.particles[:, :-1]
     dry = replace(
         g,
         name=f"[dry] {g.name}",
         kind=DRY[g.kind],
-        particles=np.column_stack([ends, sets]),
+        particles=np.column_stack([_ends(g), sets]),
         compliance=SLIP_ANGLE / torque,
         damping=np.zeros(count),
         damped=False,

@@ -6,8 +6,6 @@ direction there: rho integral(a - g) ds + m (a_end - g) has no part across the t
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 
 from ..arrays.smoothing import smoothed
@@ -51,7 +49,7 @@ def end_load(s: Seen, way: tuple[int, ...]) -> float | None:
         return None
     x, acceleration = moving
     pull = acceleration - s.gravity
-    arc = np.concatenate([[0.0], np.cumsum([s.apart[a, b] for a, b in pairwise(way)])])
+    arc = s.along(way)
     told = []
     for k in range(1, 1 + len(way) // 2):  # the bending stiffness counts more near the free end
         of_rope, of_mass = (across(x, k, v) for v in (beyond(pull, arc, k), pull[:, -1]))

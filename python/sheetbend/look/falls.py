@@ -7,8 +7,6 @@ and so it has with g in the plane of a table, which holds the rope against it.
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 
 from ..arrays.smoothing import smoothed
@@ -32,7 +30,7 @@ def falls(s: Seen, order: tuple[int, ...]) -> int:
         return 1
     x, speed = smoothed(t, x, REST / 2)
     _, acceleration = smoothed(t, speed, REST / 2)
-    arc = np.concatenate([[0.0], np.cumsum([s.apart[a, b] for a, b in pairwise(order)])])
+    arc = s.along(order)
     ends = [(x[moving], acceleration[moving], arc), (x[moving, ::-1], acceleration[moving, ::-1], arc[-1] - arc[::-1])]
     left = {way: min(_left(*end, way * s.gravity) for end in ends) for way in (1, 0, -1)}
     best = min(left, key=lambda way: left[way])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -89,7 +88,7 @@ def _stands(s: Seen, found: Held) -> bool:
     if free is None or not (found.grips or "pinned" in found.rope):
         return False
     mean = mean_position(s.recording.positions)[list(found.order)]
-    length = sum(s.apart[a, b] for a, b in pairwise(found.order))
+    length = float(s.along(found.order)[-1])
     rise = (mean[0] - mean[-1]) @ s.gravity / np.linalg.norm(s.gravity)
     return bool((rise if free == "end" else -rise) > STANDS * length)
 
@@ -99,7 +98,7 @@ def _flies(s: Seen, found: Held) -> bool:
     order = list(found.order)
     far = np.linalg.norm(np.nanmax(s.recording.positions, axis=0) - np.nanmin(s.recording.positions, axis=0), axis=1)
     turns = bool(found.alone) or "pinned" in found.rope
-    return turns or float(far[order].max()) > FLIES * sum(s.apart[a, b] for a, b in pairwise(order))
+    return turns or float(far[order].max()) > FLIES * float(s.along(order)[-1])
 
 
 def _without_others(takes: Sequence[Take], measured: Measured, kept: list[str]) -> Description | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, pairwise
 from statistics import NormalDist
 from typing import Literal
 
@@ -77,6 +77,10 @@ class Seen:
         if self.recording.gravity is not None:
             return np.asarray(self.recording.gravity)
         return np.where(np.arange(3) == self.up, -EARTH, 0.0)
+
+    def along(self, way: Sequence[int]) -> Array:
+        """(markers,) m, where markers in this order are along the line through them."""
+        return np.concatenate([[0.0], np.cumsum([self.apart[a, b] for a, b in pairwise(way)])])
 
     def upside_down(self) -> Seen:
         """The same, with gravity the other way."""
