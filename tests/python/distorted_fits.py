@@ -3,7 +3,7 @@
     python tests/python/distorted_fits.py FOLDER [NAME ...]
 
 drafts and fits each recording twice with the command line, without refits and profiles, and prints the values of the
-parameters of both, with how far they are apart in half-widths of both. `docs/tutorials/one_hand.md` has the result.
+parameters of both, with how far they are apart in half-widths of both. `docs/drafts.md` has the result.
 """
 
 from __future__ import annotations
