@@ -58,7 +58,10 @@ def draw(case: str, seeds: range, folder: Path) -> None:
 
 def rows(folder: Path) -> Iterator[str]:
     """A row of Markdown for every parameter of every case that was drawn."""
-    yield "| case | parameter | inside | of | share, 95 % bounds | wanted of 200 | median half-width | beside matched |"
+    yield (
+        "| case | parameter | intervals that contain the true value | of | share, 95 % bounds | expected of 200 "
+        "| median half-width | over that with the same mesh and step in data and fit |"
+    )
     yield "| --- | --- | --- | --- | --- | --- | --- | --- |"
     for name, case in CASES.items():
         known = lines(folder, name)

@@ -165,7 +165,10 @@ def draw(name: str, seeds: range, folder: Path) -> None:
 
 def table(folder: Path) -> None:
     """A row of Markdown for every motion that was drawn."""
-    print("| motion | draws | input inside | share | left | stiffness inside | its rms error | without the input |")
+    print(
+        "| motion | draws | values of the input inside their intervals | share | prior variance left "
+        "| stiffness inside | its rms error | without the input |"
+    )
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     for name, motion in MOTIONS.items():
         known = list(lines(folder, f"input_{name}").values())
@@ -181,7 +184,7 @@ def table(folder: Path) -> None:
             f"| {motion.about} | {len(known)} | {inside:,} of {of:,} | {100 * inside / of:.1f} % "
             f"| {100 * np.mean([e['left'] for e in known]):.0f} % "
             f"| {holds['with']} ({100 * low:.0f} to {100 * high:.0f} %) "
-            f"| {error:.2g} % | {holds['without']} inside, {off:.2g} % off, {warned} told |"
+            f"| {error:.2g} % | {holds['without']} inside, {off:.2g} % off, {warned} warned |"
         )
         size = sum(e["size"][0] <= motion.size <= (e["size"][2] or np.inf) for e in known)
         length = sum(e["length"][0] <= motion.length <= (e["length"][2] or np.inf) for e in known)
