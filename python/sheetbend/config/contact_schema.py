@@ -104,7 +104,7 @@ class ColliderSection(Section):
 
 
 class ContactSection(Section):
-    """Who may touch a collider, and how rough that is, `Scene.add_contact` (docs/contact.md). A list:
+    """What may touch a collider, and with which friction, `Scene.add_contact` (docs/contact.md). A list:
     [[scene.contact]]. It needs method = "implicit" or "gauss_seidel" in [solver]. Its quantities are <name>_friction,
     unless zero <name>_contact_radius (m), and where given <name>_contact_stiffness (N/m), <name>_contact_dissipation
     (s/m) and <name>_restitution."""

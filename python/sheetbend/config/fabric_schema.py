@@ -21,7 +21,7 @@ LIGHTEST, LIMPEST = 2.0, 4.0
 
 
 class FabricSection(Section):
-    """[fabric]: what it is."""
+    """[fabric]: the name of the fabric and the law of its tension."""
 
     name: Name = key(..., "names the results")
     about: str = key("", "a sentence on it")
@@ -31,7 +31,7 @@ class FabricSection(Section):
 
 
 class Weight(Section):
-    """[weight]: weighed pieces."""
+    """[weight]: the weight of pieces of the fabric."""
 
     specimens: Values = key(..., "weight per area of each", "g/m^2")
 
@@ -100,7 +100,7 @@ class BendingTest(Machine):
 
 
 class DrapeTest(Section):
-    """[drape]: outlines of shadows of the drape test."""
+    """[drape]: outlines of the shadows in a drape test."""
 
     outlines: Files = key(..., "a file for each specimen: points around the shadow, or a picture of it")
     units: Length | None = key(None, "of points")
@@ -124,7 +124,7 @@ class DrapeTest(Section):
 
 
 class Given(Section):
-    """[given]: numbers that no test shall find."""
+    """[given]: parameters that are given instead of fitted."""
 
     density: Positive | None = key(None, "mass per area", "kg/m^2")
     warp: Positive | None = key(None, "tension stiffness along the warp", "N/m")

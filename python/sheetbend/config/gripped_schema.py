@@ -59,8 +59,8 @@ class GrippedRopeSection(Section):
     )
     marker_mass: Finite | None = key(
         None,
-        "mass of each free marker that was not weighed with the rope, 0 where they were; when left out, 8 % of the "
-        "density count in the intervals",
+        "mass of each free marker that was not weighed with the rope, 0 if all were; when left out, the intervals "
+        "allow for 8 % of the density",
         "kg",
         ge=0,
     )
@@ -79,8 +79,8 @@ class GrippedRopeSection(Section):
     )
     gravity: Vector | None = key(
         None,
-        "in the axes of the recordings, where their JSONs do not tell; when left out, 9.81 along -z, or along the axis "
-        "of the rope's sag where that is another one and predicts better, which a warning names",
+        "in the axes of the recordings, if their JSONs do not contain it; when left out, 9.81 along -z, or along the "
+        "axis of the rope's sag if that is another one and predicts better; a warning then names the axis",
         "m/s^2",
     )
     nominal: Directions | None = key(
@@ -90,46 +90,47 @@ class GrippedRopeSection(Section):
     )
     rungs: list[RungName] = key(
         list(RUNGS),
-        "what the model gets, one after another: straight with twist, tilts of the grips, rest curvature, a stiffness "
-        "that varies along the rope, yield, by how much the grips roll about the rope as they lean, by how much the "
-        "grips are recorded later than the other markers, how far the markers sit beside the rope's axis, places of "
-        "the grips beside their markers, places of the markers along the rope; a rung stays only if it predicts most "
-        "recordings better that it was not fitted to, and no worse those that it was",
+        "effects that are added to the model one after another: straight with twist, tilts of the grips, rest "
+        "curvature, a stiffness that varies along the rope, yield, how far the grips roll about the rope as they lean, "
+        "how late the grips are recorded, how far the markers are from the rope's axis, places of the grips beside "
+        "their markers, places of the markers along the rope. A rung is kept only if it improves predictions of most "
+        "recordings that it was not fitted to, and does not worsen those of the others",
         min_length=1,
     )
     validate_share: Finite = key(
         _default("validate"),
-        "share of the recordings in `train` that decide whether a rung stays; where that is none, the end of each "
-        "recording does, this share of its time; the last fit sees all",
+        "share of the recordings in `train` that judge each rung. If that is less than one recording, the end of each "
+        "recording judges, with this share of its time. The last fit uses all recordings",
         ge=0,
         lt=1,
     )
     windows: Annotated[list[Span], Field(min_length=1)] | Literal["all"] = key(
         _default("windows"),
-        "[length, total] of the pieces that a fit sees, each predicted open loop: short ones first, whose cost is "
-        'smooth; "all" = these defaults, but the last fit sees every window of all recordings, and says first how long '
-        "that takes",
+        "[length, total] of the windows of each fit, each predicted open loop: short ones first, whose cost is "
+        'smooth. "all" = these defaults, but the last fit uses every window of all recordings; its expected time is '
+        "printed before",
         "s",
     )
     bending_lengths: list[Positive] = key(
-        _default("bending_lengths"), "of the starts, (EI/(density g))^(1/3); the best one wins", "m", min_length=1
+        _default("bending_lengths"), "of the starts, (EI/(density g))^(1/3); the best one is used", "m", min_length=1
     )
     starts: int | None = key(
         _default("starts"),
-        "number of starts, raced on the shortest windows: those of `bending_lengths`, and others drawn over two "
-        "decades about the middle one; the best of each group that ends in the same minimum is fitted to whole "
-        "recordings, and the one that predicts best goes on. When left out, those of `bending_lengths` alone",
+        "number of starts, fitted to the shortest windows: those of `bending_lengths`, and others drawn over two "
+        "decades about the middle one. The best of each group that ends in the same minimum is fitted to whole "
+        "recordings, and the recipe continues from the one that predicts best. When left out, those of "
+        "`bending_lengths` alone",
         ge=1,
         le=MOST,
     )
     segments: int = key(_default("segments"), "links at the start", ge=4, le=MOST_SEGMENTS)
     max_segments: int = key(
-        _default("max_segments"), "links are doubled, up to these, until EI moves by less than 5 %", ge=4
+        _default("max_segments"), "links are doubled, up to this number, until EI changes by less than 5 %", ge=4
     )
     substeps: int = key(_default("substeps"), "per frame", ge=1)
     smoothing: Finite = key(
         _default("smoothing"),
-        "over which starts are smoothed; grips over that or more, as their noise asks for",
+        "over which starts are smoothed; grips over this time or more, depending on their noise",
         "s",
         ge=0,
     )
@@ -159,7 +160,7 @@ class GrippedRopeSection(Section):
 
 
 class GrippedFitSection(Section):
-    """[fit]: how the fits run, beside [[gripped_rope]]."""
+    """[fit]: options of the fits, beside [[gripped_rope]]."""
 
     threads: int = key(1, "over windows and derivatives; results do not depend on it", ge=1)
     without_twist: bool = key(
@@ -178,7 +179,7 @@ class GrippedFitSection(Section):
 class GrippedConfig(Section):
     """A whole file with [[gripped_rope]]."""
 
-    experiment: ExperimentSection = key(..., "what this is")
+    experiment: ExperimentSection = key(..., "the name of the experiment")
     gripped_rope: list[GrippedRopeSection] = key(..., "the ropes", min_length=1)
     fit: GrippedFitSection = key(GrippedFitSection(), "how the fits run")
     output: OutputSection = key(OutputSection(), "what is written")

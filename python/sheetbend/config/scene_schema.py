@@ -181,8 +181,8 @@ class Tool(Section):
     quaternion: Quaternion = key([0.0, 0.0, 0.0, 1.0], "(x, y, z, w), from its axes to the recording's, as calibrated")
     about: Vector = key(
         [0.0, 0.0, 0.0],
-        "a point of the recording's frame about which the correction turns: near the tool's places, shift and turn are "
-        "told apart best",
+        "a point of the recording's frame about which the correction turns. A point near the tool's places separates "
+        "shift and turn best",
         "m",
     )
     flex: Finite | None = key(
@@ -255,7 +255,7 @@ class ExtraQuantity(Section):
 
 
 class SceneSection(Section):
-    """[scene]: what all recordings share."""
+    """[scene]: the objects and forces, shared by all recordings."""
 
     gravity: Vector | None = key(None, "the recording's own when left out, else [0, 0, -9.81]", "m/s^2")
     pin: list[Reference] = key([], "particles that are held where they start")

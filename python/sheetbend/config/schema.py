@@ -16,7 +16,7 @@ from .tools import with_corrections
 
 
 class ExperimentSection(Section):
-    """[experiment]: what this is."""
+    """[experiment]: the name of the experiment."""
 
     name: Name = key(..., "names the results and their folder")
     about: str = key("", "a sentence for the report")
@@ -176,7 +176,8 @@ class RecordingSection(Section):
     shooting: Finite | Literal["auto"] | None = key(
         None,
         'cut the motion into windows of this length, or "auto": their states at the start are found along with the '
-        "parameters, so that a chaotic motion can be fitted; the report says what the model loses per second",
+        "parameters, so that a chaotic motion can be fitted; the report gives the error that the model accumulates per "
+        "second",
         "s",
     )
     marker: list[Marker] = key([], "places of this recording's markers; those of [[marker]] when left out")
@@ -266,7 +267,7 @@ class SmoothSection(Section):
 
 
 class FitSection(Section):
-    """[fit]: how the fit runs."""
+    """[fit]: options of the fit."""
 
     optimizer: Literal["auto", "ceres", "scipy"] = key("auto", "Ceres where it was built, else SciPy")
     starts: list[dict[str, Finite]] | int = key(
@@ -317,7 +318,7 @@ class OutputSection(Section):
 class Config(Section):
     """A whole file."""
 
-    experiment: ExperimentSection = key(..., "what this is")
+    experiment: ExperimentSection = key(..., "the name of the experiment")
     solver: SolverSection = key(SolverSection(), "how motions are stepped")
     scene: SceneSection = key(..., "what all recordings share")
     marker: list[Marker] = key([], "places of markers, shared by the recordings")

@@ -33,7 +33,7 @@ def _checked(option: Option) -> AfterValidator:
 
 
 class _Substep(Section):
-    """[solver]: how motions are stepped."""
+    """[solver]: time step and method of the simulation."""
 
     substeps: int | None = key(
         None, "substeps per frame interval of each recording (its median); 10 when h is left out too", ge=1

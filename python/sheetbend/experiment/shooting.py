@@ -24,18 +24,18 @@ AUTO = "auto"
 
 @dataclass(frozen=True)
 class Shooting:
-    """How a motion is cut, and how far its windows may miss each other.
+    """How a motion is cut into windows, and how large the gaps between windows may be (multiple shooting).
 
     Attributes:
         window: s, length of a window, or "auto". The fitted part is cut into windows of equal length, none longer.
-        loss: m/s, the expected gap over the length of a window; None estimates it from the recording. What is next to
-            nothing asks for one unbroken motion.
-        behind: s, how far behind a border a window takes over from the one before, when its integrator's start has died
-            away. Gaps are measured there; their velocities are differences over as long.
-        pace: s, by which differences of velocities are multiplied.
-        states: where a search begins, (borders, quantities of the start); all three are found when a fit begins.
-        is_given: whether a user gave the loss, and no fit found it.
-        steps: how many Gauss-Newton steps the states take in an evaluation, at most.
+        loss: m/s, the expected gap divided by the length of a window; None estimates it from the recording. A tiny
+            value, such as 1e-6, requires a motion without gaps.
+        behind: s, how long after a border the gap is measured, so that the first substeps of the window's integrator
+            have no effect. Velocities there are differences over the same time. None = chosen when the fit begins.
+        pace: s, by which differences of velocities are multiplied. None = chosen when the fit begins.
+        states: (borders, quantities of the start), where the search begins; empty = chosen when the fit begins.
+        is_given: whether the user gave the loss.
+        steps: largest number of Gauss-Newton steps of the states in one evaluation.
     """
 
     window: float | str = AUTO

@@ -45,14 +45,16 @@ from .result_of import Clock, result_of
 class Fit:
     """A finished fit: the result (estimates, verdicts, errors) and what it was made from.
 
+    `fit["rope_EI"]` is the `Estimate` of a parameter, and `print(fit.report())` shows the report.
+
     Attributes:
-        result: see `FitResult`; `result.report()` is the text.
-        comparisons: measured against simulated, per experiment.
-        parameters: as given, private ones not expanded.
-        corrections: by experiment with a `driven_sigma`, (knots, markers, 3) m, what the fit added to the markers that
+        result: the `FitResult`.
+        comparisons: measured and simulated markers, one for each experiment.
+        parameters: as given; private ones are not expanded.
+        corrections: by experiment with a `driven_sigma`, (knots, markers, 3) m: what the fit added to the markers that
             the scene follows, up to the end of the fitted part.
-        on_mesh: values that explain the recordings on the mesh of the experiments, of which `comparisons` tells;
-            `values` are those at the limit of fine meshes, where these were counted.
+        on_mesh: values on the mesh of the experiments, with which `comparisons` were simulated. `values` are
+            extrapolated to the limit of fine meshes, if the fit refined the mesh.
     """
 
     result: FitResult

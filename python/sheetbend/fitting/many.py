@@ -48,24 +48,24 @@ def fit_many(
 ) -> ManyFit:
     """Fit shared parameters, and private ones of every recording, to many recordings.
 
-    `sheetbend.fit` holds one Jacobian of all recordings and parameters. This keeps a triangle of a few numbers for each
-    recording, from which its private parameters are eliminated: time and memory grow with the recordings, not with
-    their square. It looks for the minimum near the start, by the steps of `minimum.approach`.
+    `sheetbend.fit` stores one Jacobian of all recordings and parameters. `fit_many` stores a triangular matrix of a few
+    numbers for each recording, and eliminates its private parameters: time and memory grow in proportion to the number
+    of recordings. It searches for the minimum near the start, by the steps of `minimum.approach`.
 
-    Intervals of shared parameters count each recording as one draw (the sandwich of Liang and Zeger 1986, Biometrika
+    Intervals of shared parameters treat each recording as one draw (the sandwich of Liang and Zeger 1986, Biometrika
     73, 13): residuals may be correlated within a recording in any way, and recordings may differ by more than their
-    noise. They are at least as wide as those of independent residuals of the same size. `fit_many` has none of the
-    windows, starts, limits of short substeps and fine meshes, premises, profiles and doubts of `sheetbend.fit`: fit a
-    few of the recordings with `sheetbend.fit` for these.
+    noise. The intervals are at least as wide as those of independent residuals of the same size. `fit_many` has no
+    windows, starts, extrapolation in substep and mesh, premises, profiles or doubts. To get these, fit a few of the
+    recordings with `sheetbend.fit`.
 
     Args:
         experiments: at least `FEWEST`, each with a name of its own; those with `predict` are refused.
         parameters: as `sheetbend.fit` takes them.
         max_iterations: largest number of steps.
         progress: function that is called after every step.
-        journal: a file that keeps every evaluation. A fit that was killed or interrupted is called again with the same
-            journal: it goes on, and ends with the same bits. The file is removed at the end.
-        executor: its workers divide the recordings among themselves; the result has the same bits. Each worker holds
+        journal: a file that keeps every evaluation. To continue a fit that was killed or interrupted, call it again
+            with the same journal; it ends with the same bits. The file is removed at the end.
+        executor: its workers divide the recordings among themselves; the result has the same bits. Each worker stores
             all recordings, with one scene for all whose scenes have the same content.
 
     Returns:

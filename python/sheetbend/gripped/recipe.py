@@ -108,40 +108,41 @@ def fit_rope(
     """Fit a rope's parameters to recordings between two grips.
 
     Args:
-        recordings: with two or more clamped markers at each end; or their motions, smoothed already. What is wrong with
-            single ones is mended, or they are left out; the warnings name them (`gripped.screened`).
-        density: kg/m of the rope without its markers, weighed. None = not known: then stiffness and drag over the
-            density are fitted and reported, such as EI/density in m^4/s^2.
-        marker_mass: kg of each free marker that was not weighed with the rope; 0 where they were. None = not known:
-            then 8 % of the density count in the intervals.
+        recordings: with two or more clamped markers at each end; or their motions, smoothed already. Faults of single
+            recordings are repaired, or they are left out; the warnings list them (`gripped.screened`).
+        density: kg/m of the rope without its markers, weighed. None = unknown: stiffness and drag over the density are
+            fitted and reported, such as EI/density in m^4/s^2.
+        marker_mass: kg of each free marker that was not weighed with the rope; 0 if all were. None = unknown: the
+            intervals then allow for 8 % of the density.
         nominal: directions (3,) of the start and the end grip from which their frames are carried; the mean recorded
             ones by default.
-        ladder: the rungs, in order; the first one always stays.
-        validate: share of the recordings that decide whether a rung stays, and that no rung is fitted to; where that is
-            none, the share of the time of each recording, its end. The last fit sees all. At 0 what is fitted decides.
+        ladder: the effects (rungs) that are tried, in order; the first one is always kept.
+        validate: share of the recordings that judge each rung and that no rung is fitted to. If that is less than one
+            recording, the end of each recording judges, with this share of its time. The last fit uses all recordings.
+            At 0 the fitted recordings judge.
         bending_lengths: m, of the starts.
-        starts: number of starts, which are raced on the shortest windows: those of `bending_lengths`, and others drawn
-            over two decades about the middle one. One of each group that ends in the same minimum is fitted to whole
-            recordings, and the climb goes on from the one that predicts best; all are in the result. None = those of
-            `bending_lengths` alone, one after the other.
-        windows: (length, total) in s: each fit sees windows of this length, of about this total, the last one those of
-            the last entry (half as many decide on rungs). "all" = the default ones, but the last fit sees every window
-            of all recordings; its expected time is said before work starts.
-        segments, max_segments: links at the start, and at most; they are doubled until EI moves by less than 5 %. Of
-            two numbers from 24 on that agree so the smaller one is taken.
+        starts: number of starts: those of `bending_lengths`, and others drawn over two decades about the middle one.
+            All are fitted to the shortest windows. The best of each group that ends in the same minimum is fitted to
+            whole recordings, and the recipe continues from the one that predicts best; all are in the result. None =
+            those of `bending_lengths` alone, one after the other.
+        windows: (length, total) in s: each fit uses windows of this length, of about this total; the last fit uses the
+            last entry (half as many judge rungs). "all" = the default ones, but the last fit uses every window of all
+            recordings; its expected time is printed before work starts.
+        segments, max_segments: links at the start, and at most; they are doubled until EI changes by less than 5 %. Of
+            two numbers from 24 on that agree, the smaller one is used.
         substeps: per frame.
-        smoothing: s, of the starts; grips are smoothed over that or more, as their noise asks for. 0 = as recorded. In
-            these frames what had slid inside a rope that yields shows, with which each window starts.
+        smoothing: s, of the starts; grips are smoothed over this time or more, depending on their noise. 0 = as
+            recorded. These frames also show what had slid inside a rope that yields, with which each window starts.
         sigma: m, expected error of a marker.
-        gravity: m/s^2, where the recordings do not tell. None = 9.81 along -z; or along the axis of the rope's sag
-            where that is another one and starts with it predict better, which a warning names.
+        gravity: m/s^2, if the recordings do not contain it. None = 9.81 along -z, or along the axis of the rope's sag
+            if that is another one and starts with it predict better; a warning then names the axis.
         given: standard deviations of what the fit takes as given, such as {"rope_density": 0.02}; see `sheetbend.fit`.
         threads: the result does not depend on it.
         say: called with a line on each step.
         journal: file that keeps every evaluation until the rope is fitted, as that of `sheetbend.fit`.
 
     Returns:
-        RopeFit. After Ctrl-C the one of the last finished rung, its fit marked `interrupted`.
+        RopeFit. After Ctrl-C that of the last finished rung, with its fit marked `interrupted`.
 
     Raises:
         InputError, RecordingError: anything inconsistent, named, before work starts.

@@ -37,9 +37,10 @@ class Refinement:
     """How a fit is repeated on a finer time step and mesh.
 
     Attributes:
-        halve_step: move the estimate to the limit of short substeps, and count what that leaves open.
-        finer: makes the same experiments with twice the nodes; None = the mesh is not counted.
-        linear: Gauss-Newton steps with the Jacobian of the fit stand for the refit on the finer mesh.
+        halve_step: extrapolate the estimate to the limit of short substeps; intervals include the error that remains.
+        finer: function that makes the same experiments with twice the nodes. The estimate is then also extrapolated to
+            the limit of fine meshes. None = the intervals do not include the error of the mesh.
+        linear: use Gauss-Newton steps with the Jacobian of the fit instead of a second fit on the finer mesh.
     """
 
     halve_step: bool = True

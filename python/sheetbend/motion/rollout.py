@@ -124,14 +124,14 @@ class Rollout:
 def rollout(
     scene: Scene, times: ArrayLike, solver: Solver | None = None, values: Mapping[str, float] | None = None
 ) -> Rollout:
-    """Simulate a scene and keep what its gradient needs, within `solver.memory`, by default half of the free memory.
+    """Simulate a scene and store what its gradient needs, within `solver.memory`, by default half of the free memory.
 
-    Where that default makes the gradient compute states again, a warning of the logger "sheetbend.motion.rollout" says
-    what it costs.
+    If this default is too little for all states, the gradient computes some again, and the logger
+    "sheetbend.motion.rollout" warns of the cost.
 
     Args:
         scene: is frozen by this.
-        times: (frames,) s on the substep grid, where the loss looks; memory grows with their number, so give no more.
+        times: (frames,) s on the substep grid, at which the loss needs positions. Memory grows with their number.
         solver: `Solver()` by default.
         values: quantities to change for this run, by name.
 

@@ -277,13 +277,13 @@ class Recording(MarkerData):
 
     @property
     def mends(self) -> list[str]:
-        """What reading it and `mended` put right or assumed, in sentences; metadata["mended"] keeps them."""
+        """Sentences on what the reader and `mended` corrected or assumed, from metadata["mended"]."""
         said = self.metadata.get("mended", [])
         return [str(one) for one in said] if isinstance(said, list) else []
 
     def mended(self) -> Recording:
-        """Put markers that exchange their labels back, and take those that are elsewhere for some frames as not seen
-        there. `mends` tells what was done. Returns the same object where nothing was wrong."""
+        """Repair confused markers: exchanged labels are put back, and a marker is taken as not seen in frames in which
+        it is far from its path. `mends` lists what was changed. Returns the same object if nothing was wrong."""
         positions, said = relabeled(self.times, self.positions, self.markers)
         return (
             self._derive(positions=positions, metadata={**self.metadata, "mended": [*self.mends, *said]})

@@ -24,7 +24,10 @@ FORMAT = "sheetbend fit 1"
 
 @dataclass(frozen=True, kw_only=True)
 class FitResult(FitData):
-    """A finished (or interrupted) fit: its attributes are those of `FitData`; it saves, loads and reports them."""
+    """The result of a fit, as plain data: `result["rope_EI"]` is an `Estimate` with value, interval and verdict.
+
+    The attributes are those of `FitData`. `report` returns its text, `save` and `load` write and read JSON.
+    """
 
     def to_dict(self) -> dict[str, Any]:
         """Strict JSON values: no NaN and no infinity, None in their place."""
