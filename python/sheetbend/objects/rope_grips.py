@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 from ..errors import SceneError
 from ..quantities.quantities import product
 from ..scene.body import BodyPoint
-from ..scene.group import places_in_rest
 from ..scene.in_frame import drive_in_frame
 from ..scene.scene import Array, Scene
 from .body_end import STUB, hold_place
@@ -193,7 +192,7 @@ def _lengthen(
     lead = Lead(scene, f"{name}_{end}", grip, length, nodes, link)
     lead.hold(ghost, 1.0 if end == "start" else -1.0)
     places, links, nodes = places[: lead.count + 1], links[: lead.count], nodes[: lead.count + 1]
-    lead.lengthen("rest", places_in_rest(scene.groups, f"{name}_stretch")[links, 0], {})
+    lead.lengthen("rest", scene.places_of_group(f"{name}_stretch").rest[links, 0], {})
     lead.lengthen("mass", nodes, {f"{name}_density": "identity"})
     for kind in ("linear", "quadratic"):
         if f"{name}_drag_{kind}" in scene.quantities:
@@ -205,7 +204,7 @@ def _lengthen(
     ):
         if f"{name}_{stiffness}" not in scene.quantities:
             continue
-        first = scene.group(f"{name}_{group}")[1] + own
+        first = scene.places_of_group(f"{name}_{group}").constraints[own]
         lead.lengthen("compliance", first, {f"{name}_{stiffness}": "inverse"})
         if tau is not None:
             factors = {**tau[1], f"{name}_{stiffness}": "identity", f"{name}_length": "inverse"}
