@@ -50,10 +50,10 @@ def test_a_hinge_that_is_given_friction_moves_as_one_that_was_built_with_it(kind
     plain, built = (bar()[0], bar(**changed)[0]) if kind == "body" else (arms(), arms(**changed))
     values = {"hinge_angle": 0.6} if kind == "body" else {"lower_angle": 0.5}
     scene = plain.freeze()
-    _, at, group = list(_bare(scene))[-1]
+    places = list(_bare(scene))[-1]
+    group = places.group
     inputs = scene.compiled.inputs(scene.compiled.values(values))
-    first = scene.compiled.layout["rest"][0] + at
-    numbers = inputs[first : first + group.rest.size].reshape(group.rest.shape)
+    numbers = inputs[scene.compiled.layout["rest"][0] + places.rest]
     blank = sb.Recording(np.zeros((len(TIMES), 1, 3)), TIMES)
     e = sb.Experiment(scene=scene, recording=blank, markers=[sb.on_particle(0)], solver=SOLVER, sigma=1.0)
     angle = _turned(e, TIMES, values)[group.name]

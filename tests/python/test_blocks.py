@@ -12,6 +12,7 @@ from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.problem import FitProblem
 from sheetbend.statistics.blocks import Split, contradiction
 from sheetbend.statistics.layout import Layout
+from sheetbend.statistics.linearized import Linearized
 from test_identifiability import design, errors
 
 FRAMES, CHANNELS = 100, 4
@@ -35,7 +36,7 @@ def test_a_right_model_is_contradicted_as_rarely_as_promised(correlation: float)
     """One in a hundred; of 100 draws at most four, which a rate of 1 % passes in 99.7 % of all cases."""
     rng, J = np.random.default_rng(1), jacobian()
     draws = [fitted(J, errors(rng, correlation, CHANNELS, FRAMES, 0.0).ravel()) for _ in range(100)]
-    assert sum(contradiction(r, J, SPLITS, layout=LAYOUT) is not None for r in draws) <= 4
+    assert sum(contradiction(Linearized(r, J, LAYOUT), SPLITS) is not None for r in draws) <= 4
 
 
 def test_parts_that_differ_are_told_with_what_each_asks_for() -> None:
@@ -44,7 +45,7 @@ def test_parts_that_differ_are_told_with_what_each_asks_for() -> None:
     truth = np.where(HALVES.part == 0, 1.0, 3.0) * J[:, 1]
     r = fitted(J, errors(rng, 0.5, CHANNELS, FRAMES, 0.0).ravel() * 0.1 - truth)  # a residual is model - measured
     middle = np.linalg.pinv(J) @ truth
-    found = contradiction(r, J, SPLITS, layout=LAYOUT)
+    found = contradiction(Linearized(r, J, LAYOUT), SPLITS)
     assert found is not None and found.chance < 1e-6
     second = found.differences[1]
     asked = sorted(middle[1] + np.array(second.steps))
@@ -61,9 +62,9 @@ def test_parameters_of_single_recordings_are_solved_for_and_not_compared() -> No
     within = [(slice(0, 120), [1]), (slice(120, 240), [2])]
     recordings = [Split(layout.recording, ("a", "b"))]
     r = fitted(J, 0.1 * rng.standard_normal(240))
-    assert contradiction(r, J, recordings, layout=layout, within=within) is None
+    assert contradiction(Linearized(r, J, layout, within), recordings) is None
     r = fitted(J, 0.1 * rng.standard_normal(240) - np.where(layout.recording == 0, 0.5, 1.5) * shared)
-    found = contradiction(r, J, recordings, layout=layout, within=within)
+    found = contradiction(Linearized(r, J, layout, within), recordings)
     assert found is not None and [d.column for d in found.differences] == [0]
     assert sorted(found.differences[0].steps) == approx([-0.5, 0.5], abs=0.05)
 
@@ -73,8 +74,8 @@ def test_known_errors_of_the_residuals_are_no_contradiction() -> None:
     rng, J = np.random.default_rng(4), jacobian()
     shift = np.where(HALVES.part == 0, 0.0, 1.0) * J[:, 1] * np.linspace(1, 2, len(J))
     r = fitted(J, 0.1 * errors(rng, 0.0, CHANNELS, FRAMES, 0.0).ravel() + shift)
-    assert contradiction(r, J, SPLITS, layout=LAYOUT) is not None
-    assert contradiction(r, J, SPLITS, layout=LAYOUT, shifts=shift[:, None]) is None
+    assert contradiction(Linearized(r, J, LAYOUT), SPLITS) is not None
+    assert contradiction(Linearized(r, J, LAYOUT, shifts=shift[:, None]), SPLITS) is None
 
 
 def test_rows_of_no_part_do_not_make_parts_differ() -> None:
@@ -86,9 +87,9 @@ def test_rows_of_no_part_do_not_make_parts_differ() -> None:
     J = np.vstack([motion, 50.0 * rng.standard_normal((50, 2))])
     asked = np.r_[motion[:, 1] * 0.5, np.zeros(50)] + 0.1 * rng.standard_normal(450)
     halves = Split(np.repeat([0, 1, -1], [half, half, 50]), ("early", "late"))
-    assert contradiction(fitted(J, -asked), J, [halves], layout=layout) is None
+    assert contradiction(Linearized(fitted(J, -asked), J, layout), [halves]) is None
     asked[half : 2 * half] -= motion[half:, 1]  # now the second half does
-    found = contradiction(fitted(J, -asked), J, [halves], layout=layout)
+    found = contradiction(Linearized(fitted(J, -asked), J, layout), [halves])
     assert found is not None and sorted(found.differences[1].steps) == approx([-0.5, 0.5], abs=0.1)
 
 
@@ -98,7 +99,7 @@ def test_a_prior_is_no_part_of_the_data() -> None:
     r = fitted(J, 0.1 * rng.standard_normal(200)) + 0.5
     rows = np.vstack([J, [[1e3]]])
     split = [Split(np.arange(200) // 100, ("early", "late"))]
-    found = contradiction(np.append(r, -0.1), rows, split, layout=Layout.series(200))
+    found = contradiction(Linearized(np.append(r, -0.1), rows, Layout.series(200)), split)
     assert found is None
 
 

@@ -13,6 +13,7 @@ from sheetbend.doubts.driven_errors import _KNOWN, driven_errors
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.problem import FitProblem
 from sheetbend.statistics.blocks import contradiction
+from sheetbend.statistics.linearized import Linearized
 from sheetbend.statistics.shared_errors import moved_by
 from test_blocks import LAYOUT, SPLITS, fitted, jacobian
 
@@ -39,11 +40,11 @@ def test_errors_of_known_size_that_all_parts_share_are_no_contradiction() -> Non
     known = slow(np.random.default_rng(7), 64)
     draws = [fitted(J, 0.02 * rng.standard_normal(len(J)) + slow(rng, 1)[:, 0]) for _ in range(20)]
     found = [
-        sum(contradiction(r, J, SPLITS, layout=LAYOUT, errors=e) is not None for r in draws) for e in (None, known)
+        sum(contradiction(Linearized(r, J, LAYOUT, errors=e), SPLITS) is not None for r in draws) for e in (None, known)
     ]
     assert found[0] >= 4 and found[1] <= 1, found
     part = np.where(SPLITS[0].part == 0, -20.0, 20.0) * J[:, 1]
-    assert contradiction(fitted(J, draws[0] + part), J, SPLITS, layout=LAYOUT, errors=known) is not None
+    assert contradiction(Linearized(fitted(J, draws[0] + part), J, LAYOUT, errors=known), SPLITS) is not None
 
 
 def test_what_errors_move_is_the_least_squares_step() -> None:

@@ -8,6 +8,7 @@ from sheetbend.statistics.blocks import Split, contradiction
 from sheetbend.statistics.covariance import covariance
 from sheetbend.statistics.layout import Layout
 from sheetbend.statistics.left_out import left_out
+from sheetbend.statistics.linearized import Linearized
 from test_blocks import fitted
 from test_identifiability import errors
 
@@ -36,7 +37,7 @@ def losses(windows: int = WINDOWS) -> np.ndarray:
 def test_the_step_is_that_of_the_other_rows() -> None:
     J = losses()
     r = fitted(J, errors(np.random.default_rng(1), 0.8, 1, WINDOWS * FRAMES, 0.0).ravel())
-    for found in left_out(r, J, SPLIT, LAYOUT, WITHIN):
+    for found in left_out(Linearized(r, J, LAYOUT, WITHIN), SPLIT):
         rest = LAYOUT.recording != "abcd".index(found.name)
         used = np.flatnonzero(J[rest].any(axis=0))
         assert found.step == approx(-np.linalg.lstsq(J[rest][:, used], r[rest], rcond=None)[0][found.column], rel=1e-6)
@@ -49,10 +50,10 @@ def test_a_part_that_decides_what_it_hardly_tells_is_found() -> None:
     rng, J = np.random.default_rng(2), losses()
     last = LAYOUT.recording == WINDOWS - 1
     r = fitted(J, 0.01 * errors(rng, 0.5, 1, WINDOWS * FRAMES, 0.0).ravel() - 0.05 * J[:, 0] * last)
-    found = contradiction(r, J, [SPLIT], layout=LAYOUT, within=WITHIN)
+    found = contradiction(Linearized(r, J, LAYOUT, WITHIN), [SPLIT])
     assert found is not None and found.split is SPLIT
     spread = covariance(r, J, LAYOUT)
-    friction = left_out(r, J, found.split, LAYOUT, WITHIN)[0]
+    friction = left_out(Linearized(r, J, LAYOUT, WITHIN), found.split)[0]
     assert friction.name == "d"
     assert friction.reach < 0.1 * min(d.reaches[0] for d in found.differences if d.column == 0)
     assert abs(friction.step) > max(friction.reach, 1.96 * np.sqrt(spread.matrix[0, 0]))
@@ -63,7 +64,8 @@ def test_what_the_rest_leaves_open_is_left_out() -> None:
     J = losses()
     J[FRAMES:, 1] = 0.0
     r = fitted(J, errors(np.random.default_rng(3), 0.0, 1, WINDOWS * FRAMES, 0.0).ravel())
-    assert {(found.column, found.name == "a") for found in left_out(r, J, SPLIT, LAYOUT, WITHIN)} >= {(1, False)}
+    each = left_out(Linearized(r, J, LAYOUT, WITHIN), SPLIT)
+    assert {(found.column, found.name == "a") for found in each} >= {(1, False)}
 
 
 def test_windows_of_a_right_model_that_hardly_tell_two_losses_apart_agree() -> None:
@@ -71,5 +73,5 @@ def test_windows_of_a_right_model_that_hardly_tell_two_losses_apart_agree() -> N
     J, contradicted = losses(), 0
     for seed in range(20):
         r = fitted(J, errors(np.random.default_rng(seed), 0.0, 1, WINDOWS * FRAMES, 0.0).ravel())
-        contradicted += contradiction(r, J, [SPLIT], layout=LAYOUT, within=WITHIN) is not None
+        contradicted += contradiction(Linearized(r, J, LAYOUT, WITHIN), [SPLIT]) is not None
     assert contradicted <= 1

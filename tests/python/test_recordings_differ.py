@@ -12,6 +12,7 @@ from sheetbend.statistics.blocks import Contradiction, Split, contradiction
 from sheetbend.statistics.covariance import covariance
 from sheetbend.statistics.layout import Layout
 from sheetbend.statistics.left_out import left_out
+from sheetbend.statistics.linearized import Linearized
 from test_blocks import fitted
 from test_identifiability import errors
 from test_left_out import FRAMES, losses
@@ -35,7 +36,7 @@ def noise(seed: int, correlation: float) -> np.ndarray:
 
 
 def compared(r: np.ndarray, J: np.ndarray) -> Contradiction | None:
-    return contradiction(r, J, [SPLIT], layout=LAYOUT, within=WITHIN)
+    return contradiction(Linearized(r, J, LAYOUT, WITHIN), [SPLIT])
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.8])
@@ -57,7 +58,7 @@ def test_random_errors_of_all_windows_are_seen_in_their_scatter() -> None:
         assert found is not None
         off, spread = np.abs(np.linalg.pinv(J) @ error)[:2], covariance(r, J, LAYOUT)
         reach = 1.96 * np.sqrt(np.diag(spread.matrix)[:2])
-        for without in left_out(r, J, SPLIT, LAYOUT, WITHIN):
+        for without in left_out(Linearized(r, J, LAYOUT, WITHIN), SPLIT):
             column = without.column
             if off[column] > reach[column]:
                 wrong, by_one = wrong + 1, by_one + (abs(without.step) > max(reach[column], without.reach))
@@ -73,7 +74,7 @@ def test_scatter_of_white_noise_is_the_interval() -> None:
     split = Split(np.repeat(np.arange(parts), rows), tuple(map(str, range(parts))), apart=True)
     layout = Layout(split.part, np.zeros(parts * rows, dtype=int), np.tile(np.arange(rows), parts))
     r = fitted(J, rng.standard_normal(parts * rows))
-    (found,) = left_out(r, J, split, layout)
+    (found,) = left_out(Linearized(r, J, layout), split)
     alone = np.array([-np.linalg.lstsq(J[split.part == k], r[split.part == k], rcond=None)[0][0] for k in range(parts)])
     assert found.scatter == pytest.approx(2.0227 * np.std(alone, ddof=1) / np.sqrt(parts), rel=1e-3)  # t of 39
     assert found.surely == pytest.approx(found.scatter * 1.96 / 2.0227 * np.sqrt(39 / 54.572), rel=1e-3)  # chi square

@@ -15,6 +15,7 @@ from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
 from ..quantities.parameters import Parameter
 from ..quantities.quantities import Quantity, Term
+from ..scene.group import places_of_groups
 from ..scene.scene import Scene
 from .more_parameters import with_parameter
 
@@ -26,11 +27,10 @@ def undamped(scene: Scene) -> list[int]:
     """Places of the groups that have a stiffness and no damping."""
     at, size = scene.compiled.layout["compliance"]
     compliance = scene.compiled.inputs()[at : at + size]
-    ends = np.cumsum([len(g.particles) for g in scene.groups])
     return [
         k
-        for k, (g, end) in enumerate(zip(scene.groups, ends, strict=True))
-        if not g.damped and (compliance[end - len(g.particles) : end] > 0.0).any()
+        for k, places in enumerate(places_of_groups(scene.groups))
+        if not places.group.damped and (compliance[places.constraints] > 0.0).any()
     ]
 
 
@@ -54,17 +54,16 @@ def with_free_damping(problem: FitProblem, u: Array, only: str) -> FitProblem:
 def _damped(e: Experiment, theta: Array, interval: float, frames: float, only: str) -> Experiment:
     """The experiment with Kelvin-Voigt damping in its undamped groups. The time constant is `frames` intervals [s]
     between frames; the force per rate is this time over the compliance."""
-    bare = [k for k in undamped(e.scene) if only in ("", e.scene.groups[k].name)]
+    every = list(places_of_groups(e.scene.groups))
     at, _ = e.scene.compiled.layout["compliance"]
     compliance = e.scene.compiled.inputs(theta)[at:]
     scene, name = e.scene.shallow(), DAMPING.name
     scene.groups, scene.terms = list(scene.groups), list(scene.terms)
     scene.quantities = {**scene.quantities, name: Quantity(name, frames, "")}
-    first = 0
-    for k, g in enumerate(e.scene.groups):
-        own = first + np.flatnonzero(compliance[first : first + len(g.particles)] > 0.0)
-        first += len(g.particles)
-        if k in bare:
+    for k in undamped(e.scene):
+        g, own = every[k].group, every[k].constraints
+        if only in ("", g.name):
+            own = own[compliance[own] > 0.0]
             scene.groups[k] = replace(g, damped=True, damping=np.zeros(len(g.particles)))
             scene.terms.append(Term("damping", own, interval / compliance[own], ((name, "identity"),)))
     return replace(e, scene=scene)

@@ -24,7 +24,7 @@ from ..motion.simulate import simulate
 from ..motion.values import constraint_values
 from ..objects.pivot import SLIP_ANGLE
 from ..quantities.wording import short
-from ..scene.group import Group
+from ..scene.group import Group, GroupPlaces, places_of_groups
 from ..scene.scene import Scene
 from .tangents import residuals
 
@@ -64,9 +64,9 @@ def dry_frictions(problem: FitProblem, u: Array, i: int, corrected: Array | None
     try:
         without = residuals(problem, u, i, e, corrected)
         turned = _turned(e, problem.recordings[i].times, values)
-        for first, at, g in bare:
-            numbers = inputs[rest + at : rest + at + g.rest.size].reshape(g.rest.shape)
-            viscosity, angle = inputs[damping + first : damping + first + len(g.particles)], turned[g.name]
+        for places in bare:
+            g = places.group
+            numbers, viscosity, angle = inputs[rest + places.rest], inputs[damping + places.constraints], turned[g.name]
             steps = np.abs(np.diff(angle, axis=0))
             if not (viscosity > 0.0).all() or not (steps.sum(axis=0) > 0.0).all():
                 continue
@@ -79,14 +79,13 @@ def dry_frictions(problem: FitProblem, u: Array, i: int, corrected: Array | None
         return
 
 
-def _bare(scene: Scene) -> Iterator[tuple[int, int, Group]]:
-    """Viscous hinges without dry friction, and where their constraints and numbers begin."""
+def _bare(scene: Scene) -> Iterator[GroupPlaces]:
+    """Groups of viscous hinges without dry friction."""
     dry = {tuple(row[:-1]) for g in scene.groups if g.kind in DRY.values() for row in g.particles.tolist()}
-    first = at = 0
-    for g in scene.groups:
+    for places in places_of_groups(scene.groups):
+        g = places.group
         if g.kind in DRY and g.damped and not dry & set(map(tuple, _ends(g).tolist())):
-            yield first, at, g
-        first, at = first + len(g.particles), at + g.rest.size
+            yield places
 
 
 def _ends(g: Group) -> Array:

@@ -24,6 +24,7 @@ from ..motion.values import constraint_values
 from ..quantities.kinds import KINDS
 from ..quantities.parameters import Parameter
 from ..quantities.quantities import Quantity, Term
+from ..scene.group import places_of_groups
 from ..scene.scene import Scene
 from .more_parameters import with_parameter
 
@@ -56,13 +57,10 @@ def held_stiffness(problem: FitProblem, name: str) -> list[str]:
 
 def _stiffness(scene: Scene, name: str) -> Iterator[str]:
     """Names of the quantities that are a stiffness in the compliance or the numbers of a group."""
-    first = {"compliance": 0, "rest": 0}
-    for g in scene.groups:
-        size = {"compliance": len(g.particles), "rest": g.rest.size}
-        for t in scene.terms if g.name == name else ():
-            if t.array in first and 0 <= int(np.ravel(t.index)[0]) - first[t.array] < size[t.array]:
+    for places in places_of_groups(scene.groups):
+        for t in scene.terms if places.group.name == name else ():
+            if t.array in ("compliance", "rest") and np.ravel(t.index)[0] in places.of(t.array):
                 yield from (q for q, function in t.factors if function in STIFFNESS)
-        first = {array: start + size[array] for array, start in first.items()}
 
 
 def deformed(problem: FitProblem, u: Array, name: str) -> float:
@@ -115,11 +113,8 @@ def _sliding(scene: Scene, name: str, at: float) -> Scene:
     rest = np.insert(g.rest, [place, place], 0.0, axis=1)
     made.groups = list(scene.groups)
     made.groups[k] = replace(g, kind=kind, particles=np.column_stack([g.particles, sets]), rest=rest)
-    first = sum(other.rest.size for other in scene.groups[:k])
-    own = first + np.arange(rest.size).reshape(rest.shape)
-    kept = np.delete(own, [place, place + 1], axis=1)
-    behind = first + rest.size + np.arange(sum(other.rest.size for other in scene.groups[k + 1 :]))
-    moved = np.concatenate([np.arange(first), kept.ravel(), behind])
+    own = made.places_of_group(name).rest[:, place : place + 2]
+    moved = np.delete(np.arange(sum(group.rest.size for group in made.groups)), own.ravel())
     made.quantities = {
         **scene.quantities,
         SHARE.name: Quantity(SHARE.name, HALF, "", positive=False, scale=SHARE.scale),
@@ -127,11 +122,11 @@ def _sliding(scene: Scene, name: str, at: float) -> Scene:
     }
     made.terms = [
         *(_moved(term, moved) if term.array == "rest" else term for term in scene.terms),
-        *(Term("rest", own[:, place + n], 1.0, ((p.name, "identity"),)) for n, p in enumerate((SHARE, AT))),
+        *(Term("rest", own[:, n], 1.0, ((p.name, "identity"),)) for n, p in enumerate((SHARE, AT))),
     ]
     return made
 
 
-def _moved(term: Term, places: Array) -> Term:
+def _moved(term: Term, places: np.ndarray) -> Term:
     index = places[np.asarray(term.index)]
     return replace(term, index=index if np.ndim(index) else int(index))

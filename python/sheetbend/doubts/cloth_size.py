@@ -19,6 +19,7 @@ from ..mesh import TriangleMesh
 from ..minimum.problem import FitProblem
 from ..objects.cloth import Cloth, add_cloth
 from ..quantities.wording import short
+from ..scene.group import OF_CONSTRAINTS, places_of_groups
 from ..scene.scene import Scene
 from .tangents import Input, tangents
 from .told import Told
@@ -28,7 +29,6 @@ STEP = 1e-4  # of the size, and rad, to either side
 FARTHEST = 0.3  # rad: first order tells no larger angle
 FLAT = 1e-6  # of the size: how far a start that is flat may be from it
 AXES = ("warp", "weft")
-OWN = ("compliance", "damping", "rest")  # arrays with entries of constraints
 PARTICLES = ("mass", "drag_linear", "drag_quadratic")
 
 
@@ -133,8 +133,7 @@ def _differences(scene: Scene, cloth: Cloth, ends: list[Scene], values: Mapping[
     at: Array = np.array([values[name] for name in ends[0].quantities])
     low, high = (end.compiled.inputs(at) for end in ends)
     slope = (high - low) / (2.0 * STEP)
-    firsts, others = _firsts(scene), _firsts(ends[0])
-    for array in (*OWN, *PARTICLES):
+    for array in (*OF_CONSTRAINTS, *PARTICLES):
         first, size = layout[array]
         by = slope[first : first + size]
         if not by.any():
@@ -143,21 +142,9 @@ def _differences(scene: Scene, cloth: Cloth, ends: list[Scene], values: Mapping[
             yield array, cloth.particles.astype(int), by[: len(cloth.particles)]
             continue
         entries = np.zeros(size, dtype=int)
-        for g in ends[0].groups:
-            count = g.rest.size if array == "rest" else len(g.particles)
-            place = int(array == "rest")
-            mine, own = firsts[g.name][place], others[g.name][place]
-            entries[own : own + count] = mine + np.arange(count)
+        for own in places_of_groups(ends[0].groups):
+            entries[own.of(array)] = scene.places_of_group(own.group.name).of(array)
         yield array, entries, by
-
-
-def _firsts(scene: Scene) -> dict[str, tuple[int, int]]:
-    """By name of a group, its first constraint and the first of the parameters inside its constraints."""
-    found, constraints, values = {}, 0, 0
-    for g in scene.groups:
-        found[g.name] = constraints, values
-        constraints, values = constraints + len(g.particles), values + g.rest.size
-    return found
 
 
 def _longer_start(scene: Scene, cloth: Cloth, axis: int) -> Iterator[Input]:

@@ -23,6 +23,7 @@ from ..statistics.blocks import FEWEST, MOST_COLUMNS, Difference, Split, contrad
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of
 from ..statistics.left_out import LeftOut, left_out
+from ..statistics.linearized import Linearized
 from ..statistics.profile import FARTHEST, NOISELESS
 from .driven_errors import driven_errors
 from .prediction import Comparison
@@ -116,7 +117,8 @@ def _between(
     if free is not None:
         J, within = _beside_states(problem, free, used, within)
         taken -= J.shape[1] - len(used)  # each state counts as one number, as what is solved for within a recording
-    found = contradiction(r, J, every, layout=layout, within=within, shifts=known, taken=taken, errors=errors)
+    fitted = Linearized(r, J, layout, within, known, taken, errors)
+    found = contradiction(fitted, every)
     if found is None:
         return {}
     words, lack = {}, _lack(problem)
@@ -125,7 +127,7 @@ def _between(
         reach = reach_of(problem.parameters[name], estimates[name]) + SECOND_ORDER * d.shift
         if abs(d.steps[0] - d.steps[1]) > d.reach + SECOND_ORDER * d.shift and abs(d.steps[0]) > reach:
             words[name] = _difference_words(problem.parameters[name], u[column], d, lack)
-    for without in left_out(r, J, found.split, layout, within, known, taken, errors):
+    for without in left_out(fitted, found.split):
         name, column = names[used[without.column]], used[without.column]
         p = problem.parameters[name]
         reach = max(reach_of(p, estimates[name]), without.reach)

@@ -15,7 +15,6 @@ import numpy as np
 from ..arrays.timeseries import Array
 from ..objects.rod import Rod
 from ..quantities.wording import short
-from ..scene.group import places_in_rest
 from ..scene.scene import Scene
 from .tangents import Input
 
@@ -71,7 +70,7 @@ def _ratio(
         return
     if place >= known[group].rest.shape[1] or (place > 8 and "sheet_curvature" not in known[group].kind):
         return
-    at = places_in_rest(scene.groups, group)[:, place]
+    at = scene.places_of_group(group).rest[:, place]
     values = inputs[scene.compiled.layout["rest"][0] + at]
 
     def says(size: float) -> str:

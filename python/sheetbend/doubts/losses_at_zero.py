@@ -14,6 +14,7 @@ import numpy as np
 from ..arrays.timeseries import Array
 from ..experiment.experiment import Experiment
 from ..quantities.wording import short
+from ..scene.group import places_of_groups
 from .absent_damping import undamped
 from .tangents import Part
 
@@ -53,10 +54,9 @@ def losses_at_zero(e: Experiment, inputs: Mapping[str, Array], free: np.ndarray)
                 return f"it had a {array} of {short(size, 2)} {unit} for every kg, which the model lacks"
 
             yield array, (array, free, mass[free]), says
-    ends = np.cumsum([len(g.particles) for g in e.scene.groups])
+    every = list(places_of_groups(e.scene.groups))
     for k in undamped(e.scene) if touches(e) else ():
-        name, count = e.scene.groups[k].name, len(e.scene.groups[k].particles)
-        own = np.arange(ends[k] - count, ends[k])
+        name, own = every[k].group.name, every[k].constraints
         own = own[inputs["compliance"][own] > 0.0]
 
         def damped(size: float, name: str = name) -> str:

@@ -14,6 +14,7 @@ from ..arrays.timeseries import Array
 from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
+from ..scene.group import places_of_groups
 from .losses_at_zero import losses_at_zero, with_losses
 from .marker_mass import marker_load
 from .tangents import Part
@@ -66,10 +67,8 @@ def _masses(e: Experiment, held: Array) -> Iterator[Part]:
 
 def _stretch(e: Experiment, x: Array, compliance: Array) -> Iterator[Part]:
     """Elements that keep their length; the compliance of one is its length over EA."""
-    first = 0
-    for g in e.scene.groups:
-        own = first + np.arange(len(g.particles))
-        first += len(own)
+    for places in places_of_groups(e.scene.groups):
+        g, own = places.group, places.constraints
         if g.kind == "distance" and not compliance[own].any():
             length = np.linalg.norm(x[g.particles[:, 1]] - x[g.particles[:, 0]], axis=1)
 
@@ -82,14 +81,10 @@ def _stretch(e: Experiment, x: Array, compliance: Array) -> Iterator[Part]:
 def _curvature(e: Experiment, rest: Array, compliance: Array) -> Iterator[Part]:
     """The rest curvature that straight rods lack, about either axis of their sections. It turns each joint by the
     curvature times the joint's share of the length, which compliances have too."""
-    first = at = 0
-    for g in e.scene.groups:
-        own = first + np.arange(g.rest.size)
-        first += len(own)
-        share = compliance[at : at + len(g.particles)]
-        at += len(share)
+    for places in places_of_groups(e.scene.groups):
+        g, share = places.group, compliance[places.constraints]
         rod = e.scene.ropes.get(g.name.removesuffix("_bend"))
-        turns = own.reshape(g.rest.shape)[:, -2:]  # before them stands the ratio of the two stiffnesses
+        turns = places.rest[:, -2:]  # before them stands the ratio of the two stiffnesses
         if g.kind == "material_curvature" and rod is not None and not rest[turns].any():
             share = share / np.median(share) * float(rod.arc_length[-1]) / (len(rod.arc_length) - 1)
             for axis, words in enumerate(("first", "second")):

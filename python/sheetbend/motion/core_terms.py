@@ -14,6 +14,7 @@ from ..errors import DivergenceError, InputError, UnbalancedError, UnconvergedEr
 from ..quantities.kinds import KINDS
 from ..scene.compiled import CompiledScene
 from ..scene.given import check_scene
+from ..scene.group import places_of_groups
 from ..scene.scene import Scene
 
 MOST_SUBSTEPS = MOST_WHOLE
@@ -68,12 +69,11 @@ def substeps(times: ArrayLike, h: float) -> list[int]:
 
 def forces_by_group(scene: Scene, multipliers: np.ndarray) -> dict[str, np.ndarray]:
     """Multipliers (..., rows) by group, (..., count, rows)."""
-    forces, row = {}, 0
-    for g in scene.groups:
-        rows = KINDS[g.kind]["rows"]
-        part = multipliers[..., row : row + rows * len(g.particles)]
-        forces[g.name] = part.reshape(*part.shape[:-1], len(g.particles), rows)
-        row += rows * len(g.particles)
+    forces = {}
+    for places in places_of_groups(scene.groups):
+        count, rows = len(places.group.particles), KINDS[places.group.kind]["rows"]
+        part = multipliers[..., places.first_row : places.first_row + count * rows]
+        forces[places.group.name] = part.reshape(*part.shape[:-1], count, rows)
     return forces
 
 

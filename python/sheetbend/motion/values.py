@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from .. import _core
 from ..arrays.checks import check_kind
 from ..quantities.kinds import KINDS
-from ..scene.group import Group
+from ..scene.group import Group, places_of_groups
 from ..scene.scene import Array, Scene
 from .core_terms import compiled_of, forces_by_group
 from .equilibrium import Equilibrium, whole_start
@@ -121,5 +121,5 @@ def _pressure_forces(scene: Scene, inputs: Array, positions: Array) -> Array:
 def _compliances(scene: Scene, inputs: Array) -> Iterator[tuple[Group, Array]]:
     """Every group with the compliances of its constraints."""
     offset, size = scene.compiled.layout["compliance"]
-    ends = np.cumsum([len(g.particles) for g in scene.groups])
-    yield from zip(scene.groups, np.split(inputs[offset : offset + size], ends[:-1]), strict=True)
+    compliance = inputs[offset : offset + size]
+    yield from ((places.group, compliance[places.constraints]) for places in places_of_groups(scene.groups))

@@ -26,7 +26,6 @@ from ..arrays.checks import check_label, finite, is_number
 from ..errors import SceneError
 from ..quantities.quantities import Term
 from ..scene.given import check_scene
-from ..scene.group import places_in_rest
 from ..scene.scene import Scene
 from .arm_data import Arm
 from .pivot import SLIP_ANGLE, add_resistance
@@ -246,6 +245,6 @@ def _links(scene: Scene, name: str, pairs: list[tuple[int, int]], parts: list[fl
     """Rigid distances that are parts of the arm's length."""
     scene.add_constraints("distance", pairs, name=f"{name}_links", rest=np.multiply(parts, length))
     scene.groups[-1].rest[:] = 0.0
-    places = places_in_rest(scene.groups, f"{name}_links").ravel().tolist()
+    places = scene.places_of_group(f"{name}_links").rest.ravel().tolist()
     by = ((f"{name}_length", "identity"),)
     scene.add_terms([Term("rest", at, part, by) for at, part in zip(places, parts, strict=True)])

@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike
 from ..arrays.checks import check_count, check_label, finite, is_number, points
 from ..errors import SceneError
 from ..quantities.quantities import ZERO_OR_MORE, product
-from ..scene.group import places_in_rest
 from ..scene.scene import Array, Scene
 
 MOST_LINKS = 10**6
@@ -144,21 +143,20 @@ def add_links(
         compliance=np.zeros(segments),
         damping=None if damping is None else np.zeros(segments),
     )
-    _, first, _ = scene.group(group)
-    scene.groups[-1].rest[:] = 0.0
+    places = scene.places_of_group(group)
+    places.group.rest[:] = 0.0
     length = f"{name}_length"
-    rest = places_in_rest(scene.groups, group).ravel()
-    terms = [product("rest", at, 1.0 / segments, {length: "identity"}) for at in rest]
+    terms = [product("rest", at, 1.0 / segments, {length: "identity"}) for at in places.rest.ravel()]
     if EA is not None:
         scene.add_quantity(f"{name}_EA", EA, "N")
         terms += [
-            product("compliance", first + i, 1.0 / segments, {length: "identity", f"{name}_EA": "inverse"})
-            for i in range(segments)
+            product("compliance", at, 1.0 / segments, {length: "identity", f"{name}_EA": "inverse"})
+            for at in places.constraints
         ]
     if damping is not None:
         scale, tau = damping
         factors = {**tau, f"{name}_EA": "identity", length: "inverse"}
-        terms += [product("damping", first + i, scale * segments, factors) for i in range(segments)]
+        terms += [product("damping", at, scale * segments, factors) for at in places.constraints]
     scene.add_terms(terms)
 
 

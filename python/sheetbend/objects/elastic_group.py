@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..quantities.quantities import Term
-from ..scene.group import places_in_rest
 from ..scene.scene import Array, Scene
 from .flat_size import AS_MESH, FlatSize
 
@@ -51,8 +50,8 @@ def add_elastic_group(
         damping=None if constant is None else np.zeros(count),
         rest=rest,
     )
-    _, first, _ = scene.group(name)
-    at = first + np.arange(count)
+    places = scene.places_of_group(name)
+    at = places.constraints
     scene.add_quantity(quantity, value, unit, shared=True)
     less = tuple((mode, -weight) for mode, weight in varies)
     scene.add_terms([Term("compliance", at, 1.0 / scale, ((quantity, "inverse"), *size.power(-1, -1)), less)])
@@ -60,4 +59,4 @@ def add_elastic_group(
         scene.add_quantity(label, constant, "s", shared=True)
         factors = ((label, "identity"), (quantity, "identity"), *size.power(1, 1))
         scene.add_terms([Term("damping", at, scale, factors, tuple(varies))])
-    return places_in_rest(scene.groups, name)
+    return places.rest

@@ -14,7 +14,6 @@ from ..quantities.expression import Array, Expression, cross, expressions, names
 from ..quantities.quantities import ZERO_OR_MORE, Term
 from ..scene.body import AXES, GROUND, PLACE, Body, FrameState, HasMotion
 from ..scene.given import check_scene
-from ..scene.group import places_in_rest
 from ..scene.scene import Scene
 from .chain import unit_vector
 from .grip import any_across
@@ -219,19 +218,17 @@ class Making:
     def name_stiffness(self, group: str, quantity: str, value: float, unit: str, at: str | None = None) -> None:
         """Make a quantity of the stiffness that all constraints of a group have, which was given a compliance; or of
         what they push with where they are strained by the quantity `at`."""
-        own, first, _ = self.scene.group(group)
-        own.compliance[:] = 0.0
+        places = self.scene.places_of_group(group)
+        places.group.compliance[:] = 0.0
         self.scene.add_quantity(quantity, value, unit)
-        places = first + np.arange(len(own.compliance))
         strained = () if at is None else ((at, "identity"),)
-        self.scene.add_terms([Term("compliance", places, 1.0, (*strained, (quantity, "inverse")))])
+        self.scene.add_terms([Term("compliance", places.constraints, 1.0, (*strained, (quantity, "inverse")))])
 
     def name_damping(self, group: str, quantity: str, value: float, unit: str) -> None:
         """Make a quantity of the damping that all constraints of a group have, which was given one of zero."""
-        own, first, _ = self.scene.group(group)
+        places = self.scene.places_of_group(group).constraints
         limits = None if value > 0.0 else ZERO_OR_MORE
         self.scene.add_quantity(quantity, value, unit, positive=value > 0.0, limits=limits)
-        places = first + np.arange(len(own.damping))
         self.scene.add_terms([Term("damping", places, 1.0, ((quantity, "identity"),))])
 
 
@@ -249,5 +246,5 @@ def constrain(
     now = numbers(parameters, {name: scene.quantities[name].value for name in names_in(parameters)})
     given = {"compliance": compliance, "damping": damping, "viscosity": viscosity}
     scene.add_constraints(kind, stencil, name=name, rest=now, **given)
-    index = places_in_rest(scene.groups, name)
+    index = scene.places_of_group(name).rest
     scene.add_terms([t for t in terms_of("rest", index, parameters - now) if np.any(t.coefficient)])

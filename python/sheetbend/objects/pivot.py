@@ -20,7 +20,6 @@ from numpy.typing import ArrayLike
 from ..arrays.checks import is_number
 from ..errors import SceneError
 from ..quantities.quantities import ZERO_OR_MORE, Term
-from ..scene.group import places_in_rest
 from ..scene.scene import Scene
 from .arm_data import Arm
 
@@ -79,10 +78,10 @@ def _dry(scene: Scene, arm: Arm, carrier: Arm | None, before: int, friction: flo
         rest=[slip_angle],
         normal=(0.0, -1.0, 0.0),
     )
-    made, first, _ = scene.group(group)
-    made.compliance[:] = made.rest[:, -1] = 0.0  # terms make both
-    at = int(places_in_rest(scene.groups, group)[0, -1])
-    scene.add_terms([Term("compliance", first, 1.0, (slip, (quantity, "inverse"))), Term("rest", at, 1.0, (slip,))])
+    places = scene.places_of_group(group)
+    places.group.compliance[:] = places.group.rest[:, -1] = 0.0  # terms make both
+    at, rest = places.first, int(places.rest[0, -1])
+    scene.add_terms([Term("compliance", at, 1.0, (slip, (quantity, "inverse"))), Term("rest", rest, 1.0, (slip,))])
 
 
 def add_slip_angle(scene: Scene, name: str, slip_angle: float) -> str:

@@ -177,8 +177,8 @@ def add_rod(
     check_count(f"{name}.turns", turns, -MOST_LINKS, MOST_LINKS)
     check_damping(f"{name}.stretch_damping", stretch_damping, "a finite EA", EA)
     check_damping(f"{name}.shear_damping", shear_damping, "a finite GA", GA)
-    ends = End(name, "start", -1.0, start), End(name, "end", 1.0, end)
-    _check_grips(name, ends, tilts, shifts, roll)
+    ends = End(name, "start", start, tilts, shifts), End(name, "end", end, tilts, shifts, roll)
+    _check_grips(name, ends)
     ring = _is_ring(name, ends, points, length)
     check_roll(name, hold_roll, [e.label for e in ends if e.held])
 
@@ -195,7 +195,7 @@ def add_rod(
     frames = add_frames(scene, line, ends, director, turns, GA is not None, STUB_MASS * density * line.link)
     scene.add_quantity(f"{name}_GJ", GJ, "N m^2")
     _hold_axes(scene, name, "GJ", frames.directors)
-    _hold_ends(scene, line, ends, frames, hold_roll, tilts, shifts, roll)
+    _hold_ends(scene, line, ends, frames, hold_roll)
 
     joints = Joints(scene, name, frames.joints, frames.at - frames.first, segments)
     joints.bend(EI, EI2, bend_damping, yield_curvature, yield_share, softness_modes)
@@ -232,16 +232,7 @@ def _hold_axes(scene: Scene, name: str, stiffness: str, axes: Array) -> None:
     scene.add_terms([product("mass", axis, HOLD, hold) for axis in axes])
 
 
-def _hold_ends(
-    scene: Scene,
-    line: Line,
-    ends: tuple[End, End],
-    frames: Frames,
-    hold_roll: Sequence[str],
-    tilts: bool,
-    shifts: bool,
-    roll: bool,
-) -> None:
+def _hold_ends(scene: Scene, line: Line, ends: tuple[End, End], frames: Frames, hold_roll: Sequence[str]) -> None:
     """Hold the ends by their grips, junctions and bodies; spread shifts and roll of grips along the initial shape."""
     nodes, normals = line.nodes, frames.normals
     for e, k, ghost, stub in zip(ends, (0, -1), frames.ghosts, frames.stubs, strict=True):
@@ -249,24 +240,25 @@ def _hold_ends(
         e.hold_node(scene, node)
         if ghost is not None:
             normal = None if normals is None else int(normals[k])
-            e.hold(scene, node, ghost, director, normal, stub, tilts, shifts, roll and k == -1)
+            e.hold(scene, node, ghost, director, normal, stub)
         if e.label in hold_roll:
             scene.pin([director])
-        if shifts and e.grip is not None:
+        if e.shifts and e.grip is not None:
             share = np.linspace(float(k == 0), float(k == -1), len(nodes))
             spread_shift(scene, e.grip, f"{line.name}_{e.label}", nodes[1:-1], share[1:-1])
-    if roll:
+    if ends[1].roll:
         shares = np.linspace(0.0 if ends[0].held else 1.0, 1.0, len(frames.directors))
         spread_roll(scene, f"{line.name}_roll", frames.directors[:-1], shares[:-1])
 
 
-def _check_grips(name: str, ends: tuple[End, End], tilts: bool, shifts: bool, roll: bool) -> None:
+def _check_grips(name: str, ends: tuple[End, End]) -> None:
     """Raises SceneError where there is no grip whose pose could be off as is asked for."""
-    for nuisance, asked in (("tilts", tilts), ("shifts", shifts)):
-        if asked and ends[0].grip is None and ends[1].grip is None:
+    start, end = ends
+    for nuisance, asked in (("tilts", end.tilts), ("shifts", end.shifts)):
+        if asked and start.grip is None and end.grip is None:
             raise SceneError(f"{name}.{nuisance}", "need a grip", asked, "give start or end")
-    if roll and ends[1].grip is None:
-        raise SceneError(f"{name}.roll", "needs a grip at the end", roll, "give end")
+    if end.roll and end.grip is None:
+        raise SceneError(f"{name}.roll", "needs a grip at the end", end.roll, "give end")
 
 
 def _is_ring(name: str, ends: tuple[End, End], points: ArrayLike | None, length: float) -> bool:

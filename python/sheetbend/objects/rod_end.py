@@ -24,17 +24,32 @@ SERIES = 9  # powers of the roll in a start's frames: at half a turn they are of
 
 
 class End:
-    """What holds one end of a rod called `name`; `side` is -1 at its start and 1 at its end.
+    """What holds one end of a rod, and how far its pose may be off.
+
+    Args:
+        name: of the rod.
+        label: "start" or "end".
+        given: what holds it.
+        tilts, shifts, roll: whether the tilts, the shifts and the roll of a grip are added, see `add_rod`.
 
     Raises:
         SceneError: it is neither a grip nor a junction.
     """
 
-    def __init__(self, name: str, label: str, side: float, given: Grip | Junction | Facing | BodyPoint | None) -> None:
+    def __init__(
+        self,
+        name: str,
+        label: str,
+        given: Grip | Junction | Facing | BodyPoint | None,
+        tilts: bool,
+        shifts: bool,
+        roll: bool = False,
+    ) -> None:
         if given is not None and not isinstance(given, Grip | Junction | Facing | BodyPoint):
             fix = "give sb.Grip.fixed, from_poses or from_markers, a junction, or a point of a body"
             raise SceneError(f"{name}.{label}", "is no grip", given, fix)
-        self.name, self.label, self.side = name, label, side
+        self.name, self.label, self.side = name, label, -1.0 if label == "start" else 1.0
+        self.tilts, self.shifts, self.roll = tilts, shifts, roll
         self.grip = given if isinstance(given, Grip) else None
         self.point = given if isinstance(given, BodyPoint) else None
         self.way = Facing(given) if isinstance(given, Junction) else given if isinstance(given, Facing) else None
@@ -81,18 +96,7 @@ class End:
             return None
         return self.way.junction.carried(along)
 
-    def hold(
-        self,
-        scene: Scene,
-        node: int,
-        ghost: int,
-        director: int,
-        normal: int | None,
-        stub: float,
-        tilts: bool,
-        shifts: bool,
-        roll: bool,
-    ) -> None:
+    def hold(self, scene: Scene, node: int, ghost: int, director: int, normal: int | None, stub: float) -> None:
         """Give the end its pose, or join it to the other rods; the section of its stub stays across that."""
         if self.way is not None:
             self.way.junction.join(scene, f"{self.name}_{self.label}", node, ghost, director, normal, stub > 0)
@@ -111,11 +115,11 @@ class End:
             vectors = [n in scene.directors for n in nodes]
             drive_in_frame(scene, grip.frame, nodes, grip.times, motion, vectors)
         end = f"{self.name}_{self.label}"
-        if tilts:
+        if self.tilts:
             add_tilts(scene, grip, end, ghost, stub, section)
-        if shifts:
+        if self.shifts:
             add_shifts(scene, grip, end, (node, ghost))
-        if roll:  # cos and sin of it instead of the given director
+        if self.roll:  # cos and sin of it instead of the given director
             quantity = scene.add_quantity(f"{self.name}_roll", 0.0, "rad", positive=False, scale=0.3)
             add_motion(scene, grip, director, grip.director, {quantity: "cos"})
             add_motion(scene, grip, director, axes_of(grip)[1], {quantity: "sin"})

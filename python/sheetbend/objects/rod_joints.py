@@ -8,7 +8,6 @@ import numpy as np
 
 from ..errors import SceneError
 from ..quantities.quantities import Term
-from ..scene.group import places_in_rest
 from ..scene.scene import Array, Scene
 from .along_rope import mode_quantities
 from .chain import voronoi_shares
@@ -58,8 +57,8 @@ class Joints:
         if yield_curvature is not None and yield_share is not None:
             own = np.tile([yield_share, yield_curvature, 0.0, 0.0], (len(stencils), 1))
         self._group("bend", kind, f"{name}_EI", stencils, damping, tuple(softness), own)
-        places = places_in_rest(scene.groups, f"{name}_bend")
-        rest = scene.group(f"{name}_bend")[0].rest
+        bend = scene.places_of_group(f"{name}_bend")
+        places, rest = bend.rest, bend.group.rest
         if EI2 is not None:
             scene.add_quantity(f"{name}_EI2", EI2, "N m^2")
             self._ratio = ((f"{name}_EI2", "sqrt"), (f"{name}_EI", "inverse_sqrt"))
@@ -88,7 +87,7 @@ class Joints:
 
     def rest(self, curvature_modes: Sequence[int], twist_modes: Sequence[int]) -> None:
         """Rest curvature and twist in modes cos(k pi s/length)."""
-        bend, twist = (places_in_rest(self._scene.groups, f"{self._name}_{label}") for label in ("bend", "twist"))
+        bend, twist = (self._scene.places_of_group(f"{self._name}_{label}").rest for label in ("bend", "twist"))
         targets: list[tuple[str, Sequence[int], Array, Factors]] = [
             ("curvature_1", curvature_modes, bend[:, -2], ()),
             ("curvature_2", curvature_modes, bend[:, -1], self._ratio),
@@ -162,7 +161,7 @@ def _add_elastic(
     zero = np.zeros(len(stencils))
     damped = None if damping is None else zero
     scene.add_constraints(kind, stencils, name=group, compliance=zero, damping=damped, rest=rest)
-    first = scene.group(group)[1] + np.arange(len(stencils))
+    first = scene.places_of_group(group).constraints
     scene.add_terms([Term("compliance", first, coefficient, ((length, power), (stiffness, "inverse")), softness)])
     if damping is not None:
         tau = scene.add_quantity(f"{group}_damping", damping, "s")

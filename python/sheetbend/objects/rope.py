@@ -202,5 +202,5 @@ def add_rope(
     add_drag(scene, name, nodes, segments, drag_linear, drag_quadratic)
     scene.ropes[name] = built
     for e in ends:
-        e.loosen(scene, built, tilts, shifts, taus)
+        e.loosen(scene, built, taus)
     return built

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 from ..errors import SceneError
 from ..quantities.quantities import product
 from ..scene.body import BodyPoint
-from ..scene.group import places_in_rest
 from ..scene.in_frame import drive_in_frame
 from ..scene.scene import Array, Scene
 from .body_end import STUB, hold_place
@@ -45,6 +44,7 @@ class End(NamedTuple):
         grip: the grip, or the point of a body.
         clamp: (3,), the rope's direction from start to end.
         lead: m, to the first marker, where that is not known exactly.
+        tilts, shifts: whether those of a grip are added, see `add_rope`.
     """
 
     rope: str
@@ -52,6 +52,8 @@ class End(NamedTuple):
     grip: Grip | BodyPoint | None
     clamp: ArrayLike | None
     lead: float | None
+    tilts: bool
+    shifts: bool
 
     def hold(self, scene: Scene, node: int, link: float, density: float, normal: Array | None) -> int | None:
         """Hold the end, and its direction by a ghost, whose number this returns; a clamp turns about a normal (3,)."""
@@ -65,19 +67,12 @@ class End(NamedTuple):
         along = unit_vector(f"{self.rope}.clamp_{self.label}", self.clamp)
         return _clamp(scene, label, along, node, side * GHOST * link, normal)
 
-    def loosen(
-        self,
-        scene: Scene,
-        rope: Chain,
-        tilts: bool,
-        shifts: bool,
-        taus: tuple[TimeConstant | None, TimeConstant | None],
-    ) -> None:
+    def loosen(self, scene: Scene, rope: Chain, taus: tuple[TimeConstant | None, TimeConstant | None]) -> None:
         """Let a grip be askew, beside its place, or farther from the first marker."""
         ghost = rope.start_ghost if self.label == "start" else rope.end_ghost
         if not isinstance(self.grip, Grip) or ghost is None:
             return
-        _loosen(scene, rope, self.label, self.grip, ghost, tilts, shifts)
+        _loosen(scene, rope, self, self.grip, ghost)
         if self.lead is not None:
             _lengthen(scene, rope, self.label, self.grip, ghost, self.lead, taus)
 
@@ -95,7 +90,8 @@ def checked_ends(
     Raises:
         SceneError: what is no grip, a grip beside a clamp, and freedoms of a grip where there is none.
     """
-    start, end = (End(name, *given) for given in zip(("start", "end"), grips, clamps, leads, strict=True))
+    each = zip(("start", "end"), grips, clamps, leads, strict=True)
+    start, end = (End(name, *given, tilts, shifts) for given in each)
     for e in (start, end):
         field = f"{name}.grip_{e.label}"
         if e.grip is not None and not isinstance(e.grip, Grip | BodyPoint):
@@ -163,15 +159,15 @@ def _ride(scene: Scene, point: BodyPoint, name: str, node: int, reach: float, ma
     return ghost
 
 
-def _loosen(scene: Scene, rope: Chain, end: str, grip: Grip, ghost: int, tilts: bool, shifts: bool) -> None:
-    """Let a grip be askew, or beside its place."""
-    label = f"{rope.name}_{end}"
-    nodes, along = (rope.particles, 1.0) if end == "start" else (rope.particles[::-1], -1.0)
-    if tilts:
+def _loosen(scene: Scene, rope: Chain, end: End, grip: Grip, ghost: int) -> None:
+    """Let the grip of an end be askew, or beside its place."""
+    label, first = f"{rope.name}_{end.label}", end.label == "start"
+    nodes, along = (rope.particles, 1.0) if first else (rope.particles[::-1], -1.0)
+    if end.tilts:
         add_tilts(scene, grip, label, ghost, -along * GHOST * float(rope.arc_length[1]))
-    if shifts:
+    if end.shifts:
         add_shifts(scene, grip, label, (int(nodes[0]), ghost))
-        other_end = rope.end_ghost if end == "start" else rope.start_ghost
+        other_end = rope.end_ghost if first else rope.start_ghost
         shares = np.ones(len(nodes)) if other_end is None else np.linspace(1.0, 0.0, len(nodes))
         between = slice(1, None if other_end is None else -1)
         spread_shift(scene, grip, label, nodes[between], shares[between])
@@ -193,7 +189,7 @@ def _lengthen(
     lead = Lead(scene, f"{name}_{end}", grip, length, nodes, link)
     lead.hold(ghost, 1.0 if end == "start" else -1.0)
     places, links, nodes = places[: lead.count + 1], links[: lead.count], nodes[: lead.count + 1]
-    lead.lengthen("rest", places_in_rest(scene.groups, f"{name}_stretch")[links, 0], {})
+    lead.lengthen("rest", scene.places_of_group(f"{name}_stretch").rest[links, 0], {})
     lead.lengthen("mass", nodes, {f"{name}_density": "identity"})
     for kind in ("linear", "quadratic"):
         if f"{name}_drag_{kind}" in scene.quantities:
@@ -205,7 +201,7 @@ def _lengthen(
     ):
         if f"{name}_{stiffness}" not in scene.quantities:
             continue
-        first = scene.group(f"{name}_{group}")[1] + own
+        first = scene.places_of_group(f"{name}_{group}").constraints[own]
         lead.lengthen("compliance", first, {f"{name}_{stiffness}": "inverse"})
         if tau is not None:
             factors = {**tau[1], f"{name}_{stiffness}": "identity", f"{name}_length": "inverse"}

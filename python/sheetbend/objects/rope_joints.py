@@ -9,7 +9,6 @@ import numpy as np
 from ..arrays.checks import is_list, is_number
 from ..errors import SceneError
 from ..quantities.quantities import Term, product
-from ..scene.group import places_in_rest
 from ..scene.scene import Array, Scene
 from .along_rope import mode_quantities, softness_field
 from .chain import TimeConstant, voronoi_shares
@@ -79,20 +78,20 @@ def add_joints(
         damping=None if damping is None else 0.0 * ones,
         normal=normal if len(modes) else None,
     )
-    scene.groups[-1].compliance[:] = 0.0
-    _, first, _ = scene.group(group)
+    places = scene.places_of_group(group)
+    places.group.compliance[:] = 0.0
     share = voronoi_shares(len(nodes) - 1)
     stiffness = scene.add_quantity(f"{name}_EI", EI, "N m^2")
     s = np.array(at) / (len(nodes) - 1)
     softer = mode_quantities(scene, name, "softness", softness_modes, s)
-    joints = first + np.arange(len(at))
+    joints = places.constraints
     terms = [Term("compliance", joints, share[at], ((length, "identity"), (stiffness, "inverse")), tuple(softer))]
     if damping is not None:
         scale, tau = damping
         factors = (*tau.items(), (stiffness, "identity"), (length, "inverse"))
         stiffer = tuple((mode, -weights) for mode, weights in softer)
         terms.append(Term("damping", joints, scale / share[at], factors, stiffer))
-    rest = places_in_rest(scene.groups, group)
+    rest = places.rest
     for k in modes:
         mode = scene.add_quantity(f"{name}_set_{k}", 0.0, "1/m", positive=False, scale=1.0 / arc[-1])
         terms += [

@@ -127,7 +127,7 @@ class SolidClusters:
             damping=none if damping is not None else None,
             rest=np.concatenate(places),
         )
-        at = self.scene.group(group)[1]
+        at = self.scene.places_of_group(group).first
         for k, (c, own) in enumerate(self.clusters.items()):
             v = self.volumes[own]
             stiff, rows = 3.0 * v * v.sum() / self.moments[c].sum(), at + np.arange(len(own))

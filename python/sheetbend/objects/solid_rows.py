@@ -12,7 +12,6 @@ from ..arrays.checks import finite
 from ..errors import SceneError
 from ..mesh import SolidMesh
 from ..quantities.quantities import Term
-from ..scene.group import places_in_rest
 from ..scene.scene import Array, Scene
 
 STRAIN = {8: "brick_strain", 4: "tetrahedron_strain"}
@@ -139,15 +138,15 @@ class SolidRows:
         """Adds the strains along axes, columns (3, 3) or (m, 1, 3, 3), with zero compliance; returns their constraints,
         volumes and parameters."""
         at, volume = self._points(STRAIN, damped, axes, USUAL)
-        return at, volume, places_in_rest(self.scene.groups, f"{self.name}_strain")
+        return at, volume, self.scene.places_of_group(f"{self.name}_strain").rest
 
     def _yielding(self, damped: bool, stress: float, hardening: float | None) -> tuple[Array, Array]:
         """Adds the strains of what yields, with its quantities and zero compliance; returns them and their volumes.
         Their last parameters are H/(3 mu) and s sqrt(2/3)/(2 mu), with 2 mu = E/(1 + nu) (yielding_solid_strain.h)."""
         at, volume = self._points({8: YIELDING}, damped, WORLD, np.array([0.0, 1.0]), sets=2)
-        rest = self.scene.groups[-1].rest
-        values = places_in_rest(self.scene.groups, f"{self.name}_strain")
-        rest[:, -2:] = 0.0  # the terms make them
+        strains = self.scene.places_of_group(f"{self.name}_strain")
+        values = strains.rest
+        strains.group.rest[:, -2:] = 0.0  # the terms make them
         made = [(values[:, -1], "yield_stress", stress, np.sqrt(2.0 / 3.0))]
         if hardening is not None:
             made.append((values[:, -2], "hardening", hardening, 2.0 / 3.0))
@@ -184,8 +183,7 @@ class SolidRows:
         self.scene.add_constraints(
             kind, stencils, name=name, compliance=none, damping=none if damped else None, rest=rest
         )
-        first: int = self.scene.group(name)[1]
-        return first + np.arange(len(stencils))
+        return self.scene.places_of_group(name).constraints
 
     def _beside_volume(self, damped: bool, law: str, stress: float | None, hardening: float | None) -> None:
         """mu V tr E^2 + lambda V (J - 1)^2/2, 2 mu = E/(1 + nu) and lambda = E nu/((1 + nu) (1 - 2 nu)); of rubber

@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import SceneError
 from ..quantities.kinds import KINDS
 from ..quantities.quantities import intermediate_of
+from .group import OF_CONSTRAINTS, places_of_groups
 from .scene_data import SceneData
 
 Array = np.ndarray
@@ -43,18 +44,15 @@ class Domain:
         if not scene.has_drag:
             for array in ("drag_linear", "drag_quadratic"):
                 self._part(self.most, array)[:] = 0.0
-        first = value = 0
-        for g in scene.groups:
-            mine = slice(first, first + len(g.particles))
-            if KINDS[g.kind]["compliance"]["never_zero"]:
-                self._part(self.least, "compliance")[mine] = TINY
-            if not g.damped:
-                self._part(self.most, "damping")[mine] = 0.0
-            parameters = KINDS[g.kind]["parameters"]
-            for k, about in enumerate(parameters.values()):
+        for places in places_of_groups(scene.groups):
+            kind = KINDS[places.group.kind]
+            if kind["compliance"]["never_zero"]:
+                self._part(self.least, "compliance")[places.constraints] = TINY
+            if not places.group.damped:
+                self._part(self.most, "damping")[places.constraints] = 0.0
+            for own, about in zip(places.rest.T, kind["parameters"].values(), strict=True):
                 for ends, end in ((self.least, about["least"]), (self.most, about["most"])):
-                    self._part(ends, "rest")[value + k : value + g.rest.size : len(parameters)] = end
-            first, value = mine.stop, value + g.rest.size
+                    self._part(ends, "rest")[own] = end
 
     def _part(self, flat: Array, array: str) -> Array:
         offset, size = self._layout[array]
@@ -185,13 +183,10 @@ class Domain:
             names = [*(c.name for c in contacts.contacts), *(p.name for p in contacts.pieces)]
             balls = [] if contacts.balls is None else contacts.balls.particles.tolist()
             return f"'{names[i]}'" if i < len(names) else self._scene.node_in_words(balls[i - len(names)])
-        if array not in ("compliance", "damping", "rest"):
+        if array not in OF_CONSTRAINTS:
             return f"entry {i}"
-        for g in self._scene.groups:
-            count = g.rest.size if array == "rest" else len(g.particles)
-            if i < count:
-                width = g.rest.shape[1] if array == "rest" and g.rest.ndim > 1 else 1
-                part = f"'{list(KINDS[g.kind]['parameters'])[i % width]}' of " if array == "rest" else ""
-                return f"{part}constraint {i // width} of group '{g.name}'"
-            i -= count
-        raise IndexError(i)
+        places = next(p for p in places_of_groups(self._scene.groups) if i in p.of(array))
+        constraint, *parameter = np.argwhere(places.of(array) == i)[0].tolist()
+        names = list(KINDS[places.group.kind]["parameters"])
+        part = "".join(f"'{names[k]}' of " for k in parameter)
+        return f"{part}constraint {constraint} of group '{places.group.name}'"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,9 @@ from ..quantities.kinds import KINDS, VISCOUS_COMPLIANCE
 from .rest_values import rest_values
 
 Array = np.ndarray
+
+OF_CONSTRAINTS = ("compliance", "damping", "rest")
+"""Input arrays with entries of constraints, one group after the other."""
 
 
 @dataclass(frozen=True)
@@ -30,14 +33,45 @@ class Group:
     rest: Array
 
 
-def places_in_rest(groups: Sequence[Group], name: str) -> Array:
-    """(count, parameters) where the parameters of a group's constraints stand in the input array "rest"."""
-    start = 0
+@dataclass(frozen=True)
+class GroupPlaces:
+    """Where a group stands in arrays over the constraints of all groups.
+
+    Attributes:
+        group: whose places these are.
+        first: number of its first constraint.
+        first_row: number of its first scalar constraint, among Lagrange multipliers.
+        first_parameter: place of its first parameter in the input array "rest".
+    """
+
+    group: Group
+    first: int
+    first_row: int
+    first_parameter: int
+
+    @property
+    def constraints(self) -> Array:
+        """(count,) entries of the input arrays "compliance" and "damping"."""
+        return self.first + np.arange(len(self.group.particles))
+
+    @property
+    def rest(self) -> Array:
+        """(count, parameters) entries of the input array "rest"."""
+        return self.first_parameter + np.arange(self.group.rest.size).reshape(self.group.rest.shape)
+
+    def of(self, array: str) -> Array:
+        """Entries of one of the input arrays `OF_CONSTRAINTS`."""
+        return self.rest if array == "rest" else self.constraints
+
+
+def places_of_groups(groups: Sequence[Group]) -> Iterator[GroupPlaces]:
+    """Every group with its places, in the order of the arrays."""
+    first = row = parameter = 0
     for group in groups:
-        if group.name == name:
-            return start + np.arange(group.rest.size).reshape(group.rest.shape)
-        start += group.rest.size
-    raise KeyError(name)
+        yield GroupPlaces(group, first, row, parameter)
+        first += len(group.particles)
+        row += len(group.particles) * KINDS[group.kind]["rows"]
+        parameter += group.rest.size
 
 
 def make_group(

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from ..arrays.checks import check_label, finite, node_array
 from ..arrays.column import Column
 from ..errors import SceneError
-from ..quantities.kinds import KINDS
 from ..quantities.quantities import Quantity, Term
 from .air import Air
 from .body import Body
@@ -19,7 +18,7 @@ from .boundary import Boundary
 from .contacts import Contacts
 from .forces import Forces
 from .frames import Frame
-from .group import Group
+from .group import Group, GroupPlaces, places_of_groups
 from .means import start_terms
 from .volume import Volumes
 
@@ -231,12 +230,18 @@ class SceneData:
         Raises:
             SceneError: no such group.
         """
-        constraint = row = 0
-        for g in self.groups:
-            if isinstance(name, str) and g.name == name:
-                return g, constraint, row
-            constraint += len(g.particles)
-            row += len(g.particles) * KINDS[g.kind]["rows"]
+        places = self.places_of_group(name)
+        return places.group, places.first, places.first_row
+
+    def places_of_group(self, name: str) -> GroupPlaces:
+        """Where a group's constraints stand in arrays over those of all groups.
+
+        Raises:
+            SceneError: no such group.
+        """
+        for places in places_of_groups(self.groups):
+            if isinstance(name, str) and places.group.name == name:
+                return places
         raise SceneError("group", "does not exist", name, f"name one of: {', '.join(g.name for g in self.groups)}")
 
     def base_arrays(self) -> dict[str, Array]:

@@ -27,9 +27,10 @@ import numpy as np
 from ..arrays.timeseries import Array
 from ..optional import require
 from .covariance import Covariance, Sandwich
-from .gauge import RANK_TOLERANCE, null_space
-from .layout import Integers, Layout
+from .gauge import null_space
+from .layout import Integers
 from .least_squares import solved
+from .linearized import Linearized
 from .shared_errors import variance_of
 
 LEVEL = 0.01
@@ -97,77 +98,34 @@ class Contradiction:
     differences: tuple[Difference, ...]
 
 
-def contradiction(
-    residuals: Array,
-    jacobian: Array,
-    splits: Sequence[Split],
-    *,
-    layout: Layout | None = None,
-    within: Sequence[tuple[slice, Sequence[int]]] = (),
-    shifts: Array | None = None,
-    taken: float = 0.0,
-    errors: Array | None = None,
-) -> Contradiction | None:
+def contradiction(fitted: Linearized, splits: Sequence[Split]) -> Contradiction | None:
     """The least likely disagreement between parts of the data, if it is less likely than `LEVEL`.
 
     Args:
-        residuals: (rows + others,) weighted residuals at the minimum: those of the data, then those of priors and of
-            what unknowns left that were solved for at every point.
-        jacobian: (rows + others, p) their derivative in internal coordinates.
+        fitted: at the minimum.
         splits: of the rows into parts; those whose parts are too small are left out.
-        layout: where each of the data's rows comes from; by default all are data, of one series.
-        within: rows of a recording and the columns of parameters that it alone has.
-        shifts: (rows, directions) known errors of the residuals of unknown size.
-        taken: degrees of freedom of the data's residuals that unknowns took which were solved for at every point.
-        errors: (rows, draws) random draws of errors that are alike in all parts; of more draws than are compared.
 
     Raises:
         MissingExtraError: scipy is not installed.
     """
-    layout = Layout.series(len(residuals)) if layout is None else layout
-    rows = len(layout.frame)
-    known, drawn = (padded(columns, rows, len(residuals) - rows) for columns in (shifts, errors))
-    compared = [
-        found
-        for split in splits
-        if (found := _compared(residuals, jacobian, split, layout, within, known, taken, drawn))
-    ]
+    compared = [found for split in splits if (found := _compared(fitted, split))]
     least = min(compared, key=lambda found: found.chance, default=None)
     return least if least is not None and least.chance < LEVEL / len(compared) else None
 
 
-def _compared(
-    residuals: Array,
-    jacobian: Array,
-    split: Split,
-    layout: Layout,
-    within: Sequence[tuple[slice, Sequence[int]]],
-    known: Array,
-    taken: float,
-    drawn: Array,
-) -> Contradiction | None:
+def _compared(fitted: Linearized, split: Split) -> Contradiction | None:
     """Compare the parts of a split; None where a part is too small, or where there is nothing to compare."""
     if (split.part < 0).any():
         mine = split.part >= 0
-        kept = np.append(mine, np.ones(len(residuals) - len(mine), dtype=bool))
-        own = [(slice(int(mine[: k.start].sum()), int(mine[: k.stop].sum())), columns) for k, columns in within]
-        rest = replace(split, part=split.part[mine])
-        found = _compared(residuals[kept], jacobian[kept], rest, layout.of(mine), own, known[kept], taken, drawn[kept])
+        found = _compared(fitted.of(mine), replace(split, part=split.part[mine]))
         return found and replace(found, split=split)
-    rows, parts = len(layout.frame), len(split.names)
-    private = {column for _, columns in within for column in columns}
-    shared = [column for column in range(jacobian.shape[1]) if column not in private]
+    rows, parts, shared = fitted.rows, len(split.names), fitted.shared
     count = len(shared)
     sizes = np.bincount(split.part[split.part >= 0], minlength=parts)
     if count == 0 or count * parts > MOST_COLUMNS or sizes.min() < FEWEST * count:
         return None
-    signs = np.vstack([np.eye(parts - 1), -np.ones(parts - 1), np.zeros(parts - 1)])  # -1, the last, is of none
-    coding = signs[np.append(split.part, split.of_others(len(residuals) - rows))]
-    opposed = [jacobian[:, shared] * coding[:, [k]] for k in range(parts - 1)]
-    columns = np.hstack([jacobian[:, shared], *opposed, known, drawn])
-    every, left = solved_within(jacobian, within, columns, residuals, rows)
-    every, drawn = np.split(every, [every.shape[1] - drawn.shape[1]], axis=1)
-    seen = [[jacobian[:rows][split.part == k, column].any() for column in shared] for k in range(parts)]
+    every, left, drawn, known = fitted.beside_private(_opposed(fitted, split))
+    seen = [[fitted.jacobian[:rows][split.part == k, column].any() for column in shared] for k in range(parts)]
     everywhere = np.tile(np.all(seen, axis=0), parts)  # what a part does not show, it asks for no other value of
     every[:, count : count * parts][:, ~everywhere[count:]] = 0.0
     used = independent(every)
@@ -178,9 +136,10 @@ def _compared(
     behind = slice(len(used) - len(compared), None)
     step = -solved(every[:, used], left, rcond=None)
     after = left + every[:, used] @ step
-    spread = Sandwich(after[:rows], every[:rows, used], layout, every[rows:, used], taken + len(private))
+    taken = fitted.taken + len(fitted.private)
+    spread = Sandwich(after[:rows], every[:rows, used], fitted.layout, every[rows:, used], taken)
     told, apart = spread.of_estimate(), spread.at_right_angles()
-    short = short_of_frames(told, int(np.ptp(layout.frame)) + 1)
+    short = short_of_frames(told, fitted.frames)
     V, across = short * told.matrix, short * apart.matrix
     degrees = max(float(np.median((told.degrees / (2 - 1 / told.inflation))[behind])), 1.0)
     if drawn.any():
@@ -199,6 +158,14 @@ def _compared(
     )
 
 
+def _opposed(fitted: Linearized, split: Split) -> Array:
+    """(rows + others, count parts) columns of what all parts share, and of what sets each but the last apart."""
+    parts, columns = len(split.names), fitted.jacobian[:, fitted.shared]
+    signs = np.vstack([np.eye(parts - 1), -np.ones(parts - 1), np.zeros(parts - 1)])  # -1, the last, is of none
+    coding = signs[np.append(split.part, split.of_others(fitted.others))]
+    return np.hstack([columns, *(columns * coding[:, [k]] for k in range(parts - 1))])
+
+
 def _scores(values: Array, spread: Array) -> Array:
     """Independent ones of unit variance, from values with that covariance."""
     sd = np.sqrt(np.diag(spread))
@@ -210,14 +177,6 @@ def _scores(values: Array, spread: Array) -> Array:
 def short_of_frames(spread: Covariance, frames: int) -> float:
     """Factor of variances that few frames, many of them alike, make too small."""
     return float((1 + _SHORT * (spread.autocorrelation_time - 1) / frames) ** 2)
-
-
-def padded(columns: Array | None, rows: int, extra: int) -> Array:
-    """(rows + extra, n) with zeros in the rows that are no data."""
-    found = np.zeros((rows + extra, 0 if columns is None else columns.shape[1]))
-    if columns is not None:
-        found[:rows] = columns
-    return found
 
 
 def independent(every: Array) -> list[int]:
@@ -250,21 +209,3 @@ def _by_parameter(
 
     most = tuple(max((difference(j, k) for k in range(parts)), key=clear) for j in range(count))
     return Contradiction(chance, split, most)
-
-
-def solved_within(
-    jacobian: Array, within: Sequence[tuple[slice, Sequence[int]]], every: Array, residuals: Array, rows: int
-) -> tuple[Array, Array]:
-    """Columns and residuals less what the parameters of single recordings can explain of them."""
-    residuals = residuals.copy()
-    for part, columns in within:
-        own_columns = np.array(columns, dtype=int)
-        others = rows + np.flatnonzero(jacobian[rows:, own_columns].any(axis=1))
-        mine = np.append(np.arange(rows)[part], others)
-        own = jacobian[np.ix_(mine, own_columns)]
-        size = np.linalg.norm(own, axis=0)
-        basis, values, _ = np.linalg.svd(own[:, size > 0] / size[size > 0], full_matrices=False)
-        basis = basis[:, values > RANK_TOLERANCE * values.max(initial=0.0)]
-        every[mine] -= basis @ (basis.T @ every[mine])
-        residuals[mine] -= basis @ (basis.T @ residuals[mine])
-    return every, residuals

@@ -16,17 +16,16 @@ each. None moves the estimate by much, all together do.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..arrays.timeseries import Array
 from ..optional import require
-from .blocks import Split, independent, padded, short_of_frames, solved_within
+from .blocks import Split, independent, short_of_frames
 from .covariance import covariance
-from .layout import Layout
 from .least_squares import solved
+from .linearized import Linearized
 from .shared_errors import variance_of
 
 SURE = 0.05  # chance of a scatter as large
@@ -56,45 +55,29 @@ class LeftOut:
     surely: float = 0.0
 
 
-def left_out(
-    residuals: Array,
-    jacobian: Array,
-    split: Split,
-    layout: Layout,
-    within: Sequence[tuple[slice, Sequence[int]]] = (),
-    shifts: Array | None = None,
-    taken: float = 0.0,
-    errors: Array | None = None,
-) -> tuple[LeftOut, ...]:
+def left_out(fitted: Linearized, split: Split) -> tuple[LeftOut, ...]:
     """For each parameter that recordings share, the part of the data that moves it most, against its reach.
 
     Parameters that the rest of the data leaves open are not in it, and parts of which the rest has too few rows.
 
-    Args: those of `blocks.contradiction`.
-
     Raises:
         MissingExtraError: scipy is not installed.
     """
-    rows, extra = len(layout.frame), len(residuals) - len(layout.frame)
-    private = {column for _, columns in within for column in columns}
-    shared = [column for column in range(jacobian.shape[1]) if column not in private]
-    known = padded(shifts, rows, extra)
-    drawn = padded(errors, rows, extra)
+    rows, shared, taken = fitted.rows, fitted.shared, fitted.taken + len(fitted.private)
+    own_columns = fitted.jacobian[:, shared]
     most: dict[int, LeftOut] = {}
     steps: dict[int, list[float]] = {}
     for k, name in enumerate(split.names):
-        inside = np.append(split.part, split.of_others(extra)) == k
-        columns = np.hstack([jacobian[:, shared], jacobian[:, shared] * inside[:, None], known, drawn])
-        every, left = solved_within(jacobian, within, columns, residuals, rows)
-        every, noise = np.split(every, [every.shape[1] - drawn.shape[1]], axis=1)
+        inside = np.append(split.part, split.of_others(fitted.others)) == k
+        every, left, noise, known = fitted.beside_private(np.hstack([own_columns, own_columns * inside[:, None]]))
         used = independent(every)
-        elsewhere = jacobian[~inside][:, shared].any(axis=0)  # whether the rest shows it
-        if rows <= len(used) + len(private):
+        elsewhere = own_columns[~inside].any(axis=0)  # whether the rest shows it
+        if rows <= len(used) + len(fitted.private):
             continue
         step = -solved(every[:, used], left, rcond=None)
         left = left + every[:, used] @ step
-        spread = covariance(left[:rows], every[:rows, used], layout, every[rows:, used], taken + len(private))
-        V = short_of_frames(spread, int(np.ptp(layout.frame)) + 1) * spread.matrix
+        spread = covariance(left[:rows], every[:rows, used], fitted.layout, every[rows:, used], taken)
+        V = short_of_frames(spread, fitted.frames) * spread.matrix
         if noise.any():
             V = V + variance_of(every[:, used], noise)
         own = [c for c in used if c < 2 * len(shared)]
