@@ -13,7 +13,9 @@ sheetbend::Observations read_table(const char* path) {
   sheetbend::Observations observed;
   std::ifstream file(path);
   std::string line, cell;
-  std::getline(file, line);
+  if (!std::getline(file, line) || !line.starts_with("time,"))
+    throw sheetbend::InputError(path, "cannot be read or has no header",
+                                "give a table that begins with time,12_x,12_y,12_z");
   std::istringstream header(line);
   for (int column = 0; std::getline(header, cell, ','); ++column)
     if (column % 3 == 1) observed.markers.push_back(sheetbend::Marker::on(std::stoi(cell)));

@@ -133,6 +133,9 @@ class TestFitPage:
         assert "<script>alert(1)" not in page
         shown = replace(of_recording(sb.Recording(np.zeros((2, 1, 3)), [0, 1]), evil), markers=(evil,))
         assert "<script>alert(1)" not in motion_page([shown], evil, evil, evil)
+        warned = replace(fitted.result, warnings=(f"give `sigma` {evil}",))
+        page = fit_page(replace(fitted, result=warned), "warned")
+        assert "give <code>sigma</code> &lt;/script" in page and "<script>alert(1)" not in page
 
     def test_its_headline_warns_of_how_the_fit_ended_and_not_of_doubtful_values(self, fitted: sb.Fit) -> None:
         doubtful = tuple(replace(one, verdict="doubtful") for one in fitted.result.estimates)
@@ -181,6 +184,14 @@ class TestMotionPage:
         (motion,) = packed_motions([shown])
         assert [line["nodes"] for line in motion["lines"]] == [2, 2] and motion["masses"] is None
         np.testing.assert_array_equal(*(list(shown.lines.values())[k][:, 1 - k] for k in (0, 1)))  # they share a hinge
+
+    def test_what_a_rigid_body_is_drawn_as_is_said(self) -> None:
+        """A flag's pole was a large box, and nothing said why."""
+        scene = sb.Scene("box")
+        scene.add_body("box", of=sb.Inertia.box(1.0, (0.1, 0.2, 0.3)), at=(1.0, 2.0, 3.0))
+        motion = sb.simulate(scene, [0.0, 0.01], sb.Solver(h=1 / 200))
+        (packed,) = packed_motions([of_trajectory(scene, motion)])
+        assert packed["hasBodies"] and [tick["name"] for tick in packed["ticks"]] == ["box"]
 
     def test_masses_on_particles_are_drawn(self) -> None:
         """The weight at the end of a rope was missing."""
@@ -315,7 +326,7 @@ def test_a_browser_draws_it_without_a_network(fitted: sb.Fit, tmp_path: Path) ->
     assert "<title>swing \u2713</title>" in page  # set when all is drawn
     assert re.search(r'<div id="space">\s*<canvas', page) and "0.200 s" in page
     assert page.count('class="uplot') >= 4
-    assert "A cell of the floor is 10 cm." in page and "rows from m0 to" in page
+    assert "Drag to turn, scroll to zoom. A cell of the floor is 10 cm." in page and "rows from m0 to" in page
     assert re.search(r'<ul id="pairs"[^>]*><li>rope_EI</li><li>rope_bend_damping</li>', page)
     assert '<span id="controls">' in page and "<h2>Motion</h2>" in page
 

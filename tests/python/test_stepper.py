@@ -255,6 +255,7 @@ def test_copies_files_and_workers() -> None:
     with pytest.raises(sb.InputError, match="do not make a batch"):
         State.stack([])
     (batch,) = DataLoader(Motions(stepper), batch_size=4, num_workers=1)
+    assert f"{batch}" == f"State(batch=(4,), particles={stepper.scene.particle_count}, dtype=torch.float64)"
     assert torch.equal(batch.numbers, torch.stack([s.numbers for s in chain(stepper, 3)]))
 
 
@@ -265,6 +266,8 @@ def test_bad_arguments_are_refused() -> None:
         stepper(state, push=torch.zeros(3))
     with pytest.raises(sb.InputError, match="right shape"):
         stepper(state, force=torch.zeros(2, 3))
+    with pytest.raises(sb.InputError, match="is no State"):
+        stepper(state.positions)
     with pytest.raises(sb.InputError, match="position"):
         stepper(state, position=state.positions)
     with pytest.raises(sb.InputError, match="another scene"):

@@ -111,6 +111,8 @@ def test_names_of_many_parameters_are_cut(good: FitResult) -> None:
 def test_a_prediction_that_is_worse_than_none_is_said(good: FitResult) -> None:
     poor = replace(good.recordings[0], held_out=0.2)
     assert "take is predicted worse than without physics" in told(replace(good, recordings=(poor,)))["next"]
+    both = replace(good, recordings=(poor, replace(poor, name="second")))
+    assert "take, second are predicted worse" in told(both)["next"]
 
 
 def test_nothing_held_out_is_said(good: FitResult) -> None:
@@ -141,3 +143,16 @@ def test_the_given_value_that_matters_most_is_named(good: FitResult) -> None:
     found = told(replace(good, premises=(premise,)))
     assert found["next"].startswith("check that length is right to 0.2 %. If it is not") and "EI" in found["next"]
     assert "then" not in found
+
+
+def test_a_parameter_of_one_recording_is_named_last(good: FitResult) -> None:
+    """The half-width "+/- in all" that the summary named was in no table."""
+    own = tuple(estimate(f"angle_of_the_clamp[recording_{i}]") for i in range(3))
+    moved = {e.name: 0.5 for e in own} | {"EI": 0.4}
+    given = {"value": 1.0, "unit": "m", "off_by": 0.01, "words": "1 %", "leaves": 0.0, "sd": None}
+    moved_by = replace(good, estimates=(*own, estimate("EI")), premises=(Premise(name="length", moved=moved, **given),))
+    assert "half-width of EI" in told(moved_by)["next"]
+    wide = tuple(replace(e, in_all=50.0, unit="N m^2 of a long unit name") for e in moved_by.estimates)
+    notes = dict({part.title: part.notes for part in sections(replace(moved_by, estimates=wide))}["Parameters"])
+    assert notes["+/- in all"].startswith("EI 50")
+    assert "(parameters.csv has those of the other parameters)" in notes["+/- in all"]

@@ -80,6 +80,19 @@ def test_the_unit_of_a_garment_is_told_by_its_size(folder: Path, unit: str, scal
     assert "5 vertices lie within" in result.stdout
 
 
+def test_pieces_of_a_garment_that_fall_are_told(folder: Path) -> None:
+    """Two panels that share no vertex, one below the other, each face twice, as a two-sided export has them."""
+    panel = sb.mesh.grid(0.4, 0.6, 4, 6)
+    both = np.concatenate([panel.vertices, panel.vertices - [0, 0.7, 0]])
+    faces = np.concatenate([panel.triangles, panel.triangles + len(panel.vertices)]) + 1
+    lines = [f"v {x} {y} {z}" for x, y, z in both] + [f"f {a} {b} {c}\nf {c} {b} {a}" for a, b, c in faces]
+    (folder / "panels.obj").write_text("\n".join(lines))
+    result = run("new", "panels.obj")
+    assert result.exit_code == 0 and "70 vertices, 96 triangles" in result.stdout
+    assert "96 triangles that repeat others are left out" in result.output
+    assert "what joins its 2 pieces: 1 of them hang" in result.stdout
+
+
 @pytest.mark.parametrize(("up", "gravity", "corner"), [("x", -9.81, "lower"), ("-x", 9.81, "upper")])
 def test_the_axis_of_a_garment_that_points_up_is_told(folder: Path, up: str, gravity: float, corner: str) -> None:
     sb.mesh.write_obj(folder / "panel.obj", sb.mesh.grid(0.4, 0.6, 4, 6))

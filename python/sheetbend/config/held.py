@@ -10,14 +10,15 @@ _FEW = 4  # markers that are named; of more their number is
 
 
 def assumptions(config: Config) -> tuple[str, ...]:
-    """A sentence for each end of each rope and rod, ropes first; and one if nothing places the markers of the only
-    rope."""
+    """A sentence for each end of each rope and rod, ropes first. A last one follows where a configuration with one rope
+    does not say where its markers are."""
     strands = [strand for _, strand in config.scene.strands]
     ends = tuple(f"{s.name}, {end}: {_of_end(config.scene, s, end)}" for s in strands for end in ("start", "end"))
     unplaced = not config.marker and any(r.cloud is None and not (r.marker or r.here) for r in config.recording)
     if len(strands) != 1 or config.scene.cloth or strands[0].markers or not unplaced:
         return ends
-    return (*ends, f"{strands[0].name}, markers: all of them, at equal distances from end to end: nothing places them")
+    own = f"{strands[0].name}, markers"
+    return (*ends, f"{own}: all of them, at equal distances from end to end, because no key says where they are")
 
 
 def _of_end(section: SceneSection, strand: Rope | Rod, end: str) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..motion.inputs_of_quantities import InputsOfQuantities
 from ..motion.rollouts import Rollouts
 from ..scene.compiled import CompiledScene
 
@@ -33,7 +34,7 @@ class FlatInputs:
         arrays: Sequence[str],
         nodes: bool = False,
     ) -> None:
-        self._compiled, self._rollouts = compiled, rollouts
+        self._compiled, self._rollouts, self._of_quantities = compiled, rollouts, InputsOfQuantities(compiled)
         self._shown = compiled.nodes if nodes else compiled.particles
         self._columns = [compiled.names.index(name) for name in names]
         self._places = [slice(o, o + n) for o, n in (compiled.given[name] for name in arrays)]
@@ -54,8 +55,7 @@ class FlatInputs:
         kept = inputs_bar.copy()
         for place in self._places:
             kept[:, place] = 0.0  # what was given itself does not follow from quantities
-        theta_bar = np.stack([self._compiled.theta_bar(t, b) for t, b in zip(every, kept, strict=True)])
-        return theta_bar[:, self._columns].reshape(theta.shape), arrays_bar
+        return self._of_quantities.vjp(every, kept)[:, self._columns].reshape(theta.shape), arrays_bar
 
     def _rows(self, theta: Array, arrays: Sequence[Array]) -> tuple[Array, list[Array]]:
         """All quantities (batch, quantities), and the arrays (batch, numbers)."""
@@ -64,11 +64,10 @@ class FlatInputs:
         every = np.tile(self._compiled.theta, (count, 1))
         if given is not None:
             every[:, self._columns] = given
-        self._compiled.domain.check_quantities(every)
         return every, [np.asarray(a, dtype=float).reshape(count, -1) for a in arrays]
 
     def _inputs(self, every: Array, rows: Sequence[Array]) -> Array:
-        inputs = np.stack([self._compiled.inputs(theta) for theta in every])
+        inputs = self._of_quantities.value(every)
         for place, row in zip(self._places, rows, strict=True):
             inputs[:, place] = row
         return inputs

@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import MeshError
 from ..files.units import METERS
 from ..mesh import read_mesh
+from ..mesh.topology import components, edges
 from .cloth_sheet import AIR
 from .draft import Draft, written
 from .take import Measured
@@ -54,6 +55,9 @@ def draft_of_mesh(
     vertices, area = scale * mesh.vertices, scale**2 * float(mesh.areas.sum())
     size, low, top = np.ptp(vertices, axis=0), vertices.min(axis=0), (sign * vertices[:, axis]).max()
     rim = top - RIM * size[axis]
+    held = sign * vertices[:, axis] >= rim
+    piece = components(len(vertices), edges(mesh.triangles))
+    falling = len(np.setdiff1d(piece, piece[held]))
     is_up = np.arange(3) == axis
     corner = "lower" if sign > 0 else "upper"  # of a box that is open above
     box = np.where(is_up, sign * rim, low - size.max() if sign > 0 else low + 2 * size.max())
@@ -61,16 +65,17 @@ def draft_of_mesh(
         f"{file}: {len(vertices)} vertices, {len(mesh.triangles)} triangles, "
         f"{' x '.join(f'{v:.3g}' for v in size)} m, {area:.3g} m^2 of fabric",
         f"lengths are taken as {unit}",
-        f"{(sign * vertices[:, axis] >= rim).sum()} vertices lie within {RIM:.0%} of its height of the top: "
-        "they are held",
+        f"{held.sum()} vertices lie within {RIM:.0%} of its height of the top: they are held",
     ]
-    unknown = [
-        "what holds the garment: its upper rim is taken, where it is. Change the box of the set, or add a grip",
-        *(
-            ()
-            if upward
-            else [f"which axis points up: {up} is taken, as in most files of this kind; --up z says another"]
-        ),
+    unknown = ["what holds the garment: its upper rim is taken, where it is. Change the box of the set, or add a grip"]
+    if falling:
+        unknown.append(
+            f"what joins its {len(np.unique(piece))} pieces: {falling} of them hang on nothing that is held, and fall. "
+            "Sew them in the program that made the mesh, so that they share vertices, or hold each with a set"
+        )
+    if not upward:
+        unknown.append(f"which axis points up: {up} is taken, as in most files of this kind; --up z says another")
+    unknown += [
         "the fabric: the numbers of a light woven cotton are assumed. `sheetbend fabric` finds those of a fabric from "
         "tests, and `fabric_file` takes them",
         "the warp: it is taken to run upward. Give texture coordinates in meters, or change `warp`",
@@ -86,6 +91,7 @@ def draft_of_mesh(
     notes = {"density": "kg/m^2", "warp": "N/m", "shear": "N/m", "bending": "N m"}
     lines += table("[[scene.cloth]]", cloth, notes)
     lines += table("[scene.cloth.mesh]", shape, {"merge": "vertices that exporters split at seams"})
-    held = {"name": "held", corner: box.tolist()}
-    lines += table("[[scene.cloth.set]]", held, {corner: "m, corner of a box that is open above"})
+    lines += table(
+        "[[scene.cloth.set]]", {"name": "held", corner: box.tolist()}, {corner: "m, corner of a box that is open above"}
+    )
     return written("a garment", name, [file], seen, unknown, lines, "mesh")

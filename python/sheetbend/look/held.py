@@ -308,35 +308,31 @@ def _guessed(s: Seen, found: Held, lies: bool) -> str:
     rise = height[first] - height[last]
     spread = np.nanvar(r.positions, axis=0).sum(axis=1)
     k, other = (first, last) if starts[0] < starts[1] else (last, first)
-    lower = abs(rise) > HIGHER * float(s.apart[first, last]) and height[k] < height[other]
+    apart = abs(rise) > HIGHER * float(s.apart[first, last])
     # a lower end that moves first, and more than the upper one, was let go
-    if s.rest and abs(starts[0] - starts[1]) > FIRST and not (lower and spread[k] > spread[other]):
-        at = "start" if k == first else "end"
+    let_go = apart and height[k] < height[other] and spread[k] > spread[other]
+    leads = bool(s.rest) and abs(starts[0] - starts[1]) > FIRST and not let_go
+    if leads:
+        why = "moves first"
         found.notes.append(f"{r.markers[k]} is the end that moves first")
-        found.unknown.append(
-            f"what holds the rope: no marker stays or has a name such as hand or grip, so {r.markers[k]}, the end that "
-            "moves first, is taken"
-        )
-        return at
-    if abs(rise) > HIGHER * float(s.apart[first, last]):
-        at, why = ("start" if rise > 0 else "end"), "the upper end"
+    elif apart:
+        k, why = (first if rise > 0 else last), "is the upper end"
     else:
-        less = "start" if spread[first] < spread[last] else "end"
-        more = "end" if less == "start" else "start"
-        at, why = (more, "the end that moves more") if lies else (less, "the end that moves less")
-    k = first if at == "start" else last
+        k = first if (spread[first] > spread[last]) == lies else last
+        why = f"moves {'more' if lies else 'less'} than the other end"
     found.unknown.append(
-        f"what holds the rope: no marker stays or has a name such as hand or grip, so {r.markers[k]}, {why}, is taken"
+        f"what holds the rope: no marker stays or has a name such as hand or grip. {r.markers[k]} is taken, because it "
+        f"{why}"
     )
     other = last if k == first else first
-    if spread[k] < BEYOND**2 * spread[other] and not lies:
+    if spread[k] < BEYOND**2 * spread[other] and not lies and not leads:
         share = np.sqrt(spread[k] / spread[other])
         found.unknown.append(
             f"what holds the rope beyond {r.markers[k]}, which moves by only {share:.0%} of what {r.markers[other]} "
             f"does: it is likely a clamp that no marker shows. The model lets the rope turn at {r.markers[k]}, and EI "
             "then comes out wrong. Put a marker where the clamp ends"
         )
-    return at
+    return "start" if k == first else "end"
 
 
 def _leaves(s: Seen, k: int) -> float:

@@ -58,7 +58,8 @@ def read_mesh(
         texture_size: m per unit of texture coordinates, one number or (u, v).
         warp: (3,) direction of warp for "unfold".
         merge: mend what exporters leave: make one vertex of those at equal positions, as they are split where normals
-            differ, leave out vertices without a triangle, and turn triangles that face against the others.
+            differ, leave out triangles that repeat others and vertices without a triangle, and turn triangles that face
+            against the others.
 
     Warns:
         UserWarning: for each of the mesh's `doubts`, for triangles left out, and for a size that suggests another unit.
@@ -201,8 +202,13 @@ def _merged(vertices: Array, triangles: NDArray[np.int64]) -> tuple[Array, NDArr
 def _mended(
     vertices: Array, triangles: NDArray[np.int64], texture: Array | None
 ) -> tuple[Array, NDArray[np.int64], Array | None, list[str]]:
-    """A mesh without unused vertices, whose triangles face one way, and sentences on both."""
+    """A mesh without repeated triangles and unused vertices, whose triangles face one way, and sentences on each."""
     said = []
+    _, first = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
+    if len(first) < len(triangles):
+        said.append(f"{len(triangles) - len(first)} triangles that repeat others are left out.")
+        first.sort()
+        triangles, texture = triangles[first], None if texture is None else texture[first]
     turned = turned_alike(triangles)
     if len(turned):
         triangles = triangles.copy()

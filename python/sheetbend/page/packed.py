@@ -58,6 +58,7 @@ def _packed(motion: Shown, most: int) -> dict[str, Any]:
         "up": motion.up.tolist(),
         "markers": list(motion.markers),
         "isCloud": motion.is_cloud,
+        "hasBodies": bool(motion.bodies),
         "masses": places(motion.masses),
         "measured": places(motion.measured),
         "simulated": places(motion.simulated),

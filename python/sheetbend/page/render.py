@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import gzip
 import json
+import re
 from importlib.resources import files
 from typing import Any
 
@@ -25,6 +26,7 @@ def render(template: str, **values: Any) -> str:
     loader = jinja2.FunctionLoader(lambda name: (_PARTS / "templates" / name).read_text(encoding="utf-8"))
     # Templates are ours; everything that a user, a file or a result puts into one is escaped.
     environment = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["coded"] = lambda text: _coded(jinja2.utils.markupsafe.escape(text))
     environment.filters["as_json"] = lambda value: jinja2.utils.markupsafe.Markup(as_json(value))
     environment.globals["asset"] = lambda name: jinja2.utils.markupsafe.Markup(_asset(name))
     return str(environment.get_template(template).render(**values))
@@ -51,6 +53,11 @@ def table(section: Section) -> dict[str, Any]:
         "left": [left[k] for k in columns],
         "notes": [(label, raised(sentence)) for label, sentence in section.notes],
     }
+
+
+def _coded(escaped: Any) -> Any:
+    """What stands between grave accents as code, in escaped text."""
+    return type(escaped)(re.sub(r"`([^`]+)`", r"<code>\1</code>", escaped))
 
 
 def _asset(name: str) -> str:

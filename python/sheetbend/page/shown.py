@@ -44,7 +44,8 @@ class Shown:
         lines: ropes by name, (frames, nodes, 3) m; of a scene without ropes, its links.
         line_kind: what the legend calls them.
         ticks: short lines by name, (frames, lines, 2, 3) m: "twist" of rods, from an edge's middle along its director,
-            and the outlines of colliders.
+            and the outlines of colliders and bodies.
+        bodies: names of the rigid bodies among the ticks.
         sheets: cloths and surfaces of solids by name.
         masses: (frames, n, 3) m, particles that carry a mass of their own; None without.
         markers: names of the measured markers.
@@ -59,6 +60,7 @@ class Shown:
     lines: Mapping[str, Array] = field(default_factory=dict)
     line_kind: str = "rope"
     ticks: Mapping[str, Array] = field(default_factory=dict)
+    bodies: tuple[str, ...] = ()
     sheets: Mapping[str, Sheet] = field(default_factory=dict)
     masses: Array | None = None
     markers: tuple[str, ...] = ()
@@ -136,7 +138,7 @@ def _motion_shown(name: str, scene: Scene, times: Array, positions: Array, recor
     ticks = _ticks(scene, positions) | collider_lines(scene, times, positions) | boxes
     heavy, up = point_masses(scene), _unit(-scene.gravity)
     masses = positions[:, heavy] if len(heavy) else None
-    return Shown(name, times, lines, kind, ticks, sheets, masses, up=up, **recorded)  # type: ignore[arg-type]
+    return Shown(name, times, lines, kind, ticks, tuple(boxes), sheets, masses, up=up, **recorded)  # type: ignore[arg-type]
 
 
 def _sheet(mesh: TriangleMesh, positions: Array, kind: str) -> Sheet:

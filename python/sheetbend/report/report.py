@@ -157,7 +157,8 @@ def _parameters(result: FitData) -> Section:
         words = f"half-width if given values may be off too, by up to {PLAUSIBLE}, unless residuals would show it"
         if wide(((*headers, IN_ALL), *beside)):
             shared = [name for name in in_all if not name.endswith("]")] or list(in_all)
-            words = f"{', '.join(f'{name} {in_all[name]}' for name in shared)}: {words}"
+            others = "" if len(shared) == len(in_all) else " (parameters.csv has those of the other parameters)"
+            words = f"{', '.join(f'{name} {in_all[name]}' for name in shared)}{others}: {words}"
         else:
             headers, rows = (*headers, IN_ALL), beside
         notes.insert(0, (IN_ALL, f"{words}{_most(dependences(result))}"))

@@ -132,7 +132,8 @@ def _before_use(result: FitData) -> Iterator[str]:
         yield f'do not use {_names(result, UNSOUND)} before you have read "What contradicts this fit"'
     worse = [name for name, r in _held_out(result).items() if r.baseline and r.held_out and r.held_out > r.baseline]
     if worse:
-        yield f"look in report.html why {', '.join(worse[:NAMED])} is predicted worse than without physics"
+        words = f"{', '.join(worse[:NAMED])} {'is' if len(worse) == 1 else 'are'} predicted worse than without physics"
+        yield f"look in report.html why {words}"
     if _noise_ratio(result) > FAR:
         yield "look at where and when the residuals are large: the model lacks something there, or sigma is too small"
     if verdicts & {*OPEN}:
@@ -143,7 +144,8 @@ def _before_use(result: FitData) -> Iterator[str]:
         yield narrower
     found = dependences(result)
     if found:
-        name, on = next(iter(found.items()))
+        name = min(found, key=lambda n: n.endswith("]"))  # the report lists those of shared parameters first
+        on = found[name]
         yield f'check that {on.name} is right to {on.size}. If it is not, use "+/- in all" as the half-width of {name}'
     if weak and "identified" in verdicts:
         yield narrower

@@ -146,7 +146,8 @@ class CompiledScene:
         return inputs[offset : offset + size]
 
     @cached_property
-    def _map(self) -> _core.ParameterMap:
+    def map_of_quantities(self) -> _core.ParameterMap:
+        """From the scene's own quantities to its inputs, without checks."""
         return _core.ParameterMap(self.map())
 
     def _pack(self, scene: SceneData) -> np.ndarray:
@@ -238,23 +239,17 @@ class CompiledScene:
             SceneError: some are not finite, or negative where that makes no sense; names the quantities.
         """
         theta = self.theta if theta is None else theta
-        found = self._map.inputs(theta)
+        found = self.map_of_quantities.inputs(theta)
         self.domain.check_inputs(found[None], theta)
         return found
 
     def inputs_dot(self, theta: np.ndarray, theta_dot: np.ndarray) -> np.ndarray:
         """Tangent of the inputs along theta_dot."""
-        return self._map.inputs_dot(theta, theta_dot)
+        return self.map_of_quantities.inputs_dot(theta, theta_dot)
 
     def theta_bar(self, theta: np.ndarray, inputs_bar: np.ndarray) -> np.ndarray:
         """Cotangent of the quantities from that of the inputs."""
-        return self._map.theta_bar(theta, inputs_bar)
-
-    def theta_bar_dot(
-        self, theta: np.ndarray, theta_dot: np.ndarray, inputs_bar: np.ndarray, inputs_bar_dot: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Derivative of `theta_bar` along (theta_dot, inputs_bar_dot), with its value."""
-        return self._map.theta_bar_dot(theta, theta_dot, inputs_bar, inputs_bar_dot)
+        return self.map_of_quantities.theta_bar(theta, inputs_bar)
 
     def unpack(self, flat: np.ndarray) -> dict[str, np.ndarray]:
         """A flat vector of inputs (or their cotangents) by array name, of particles without hidden nodes; vectors per

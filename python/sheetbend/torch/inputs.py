@@ -1,33 +1,19 @@
-"""The flat inputs of a scene as torch operations on the tensors of its named quantities and arrays."""
+"""The flat inputs of a scene as a differentiable function of the tensors of its named quantities and arrays."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping
 
 import numpy as np
 import torch
 from torch import Tensor
-from torch.autograd import Function
 
 from ..arrays.checks import given_by_name
 from ..errors import InputError, choices
-from ..quantities.quantities import FUNCTIONS
+from ..motion.inputs_of_quantities import InputsOfQuantities
 from ..scene.scene import Scene
-
-_TORCH: Mapping[str, Callable[[Tensor], Tensor]] = {
-    "identity": lambda x: x,
-    "inverse": torch.reciprocal,
-    "square": torch.square,
-    "sin": torch.sin,
-    "cos": torch.cos,
-    "sqrt": torch.sqrt,
-    "inverse_sqrt": torch.rsqrt,
-    "over_one_plus": lambda x: 1.0 / (1.0 + x),
-    "over_one_minus_twice": lambda x: 1.0 / (1.0 - 2.0 * x),
-}
+from .function import respond
 
 NEEDS = {
     "force": "scene.add_force(particles, forces)",
@@ -38,115 +24,17 @@ NEEDS = {
 """What gives a scene the arrays that it may lack."""
 
 
-class ParameterMap:
-    """inputs[target] = base[target] + sum of coefficient * (prod f(theta) * exp(sum weight * theta)), in the order of
-    adjoint/observe/parameter_map.h.
-
-    Plain torch operations, so every transform differentiates and batches it by itself. Intermediate values stand before
-    theta. Each step computes those that are made of earlier ones, and the last step computes the inputs.
-    """
-
-    def __init__(self, scene: Scene) -> None:
-        arrays = scene.compiled.map()
-        self._base = torch.tensor(arrays["base"], dtype=torch.float64)
-        depth, made = _depths(arrays), max(0, -int(arrays["target"].min(initial=0)))
-        self._intermediates, last = made, int(depth.max(initial=0))
-        self._steps = [_Step.of(arrays, depth == k, made) for k in range(last)]
-        self._last = _Step.of(arrays, depth == last, made)
-
-    def __call__(self, theta: Tensor) -> Tensor:
-        """(..., quantities) to (..., total)."""
-        batch = theta.shape[:-1]
-        known = torch.cat([theta.new_zeros(*batch, self._intermediates), theta], -1)
-        for step in self._steps:
-            known = step.added_to(known, known)
-        return self._last.added_to(self._base.expand(*batch, -1), known)
-
-
-@dataclass(frozen=True, eq=False)
-class _Step:
-    """Terms that are made of known values, and where they go.
-
-    Attributes:
-        target, coefficient: (terms,).
-        functions: (name, values, weights) of all functions of weighted values; each is computed once.
-        factors, exponents: (terms, most) places among them, in the order of each term.
-    """
-
-    target: Tensor
-    coefficient: Tensor
-    functions: list[tuple[str, Tensor, Tensor]]
-    factors: Tensor
-    exponents: Tensor
-
-    @classmethod
-    def of(cls, arrays: Mapping[str, np.ndarray], chosen: np.ndarray, intermediates: int) -> _Step:
-        """Some of the terms of a map, all of which go to inputs or all to intermediate values."""
-        count = np.diff(arrays["first_factor"])
-        own = np.repeat(chosen, count)
-        parameter, function = arrays["parameter"][own], arrays["function"][own]
-        place = np.where(parameter < 0, -1 - parameter, intermediates + parameter)
-        each = np.stack([function, place, arrays["weight"][own]], 1).astype(float).reshape(-1, 3)
-        distinct, which = np.unique(each, axis=0, return_inverse=True)
-        groups = {name: distinct[distinct[:, 0] == number] for name, number in FUNCTIONS.items()}
-        count, which = count[chosen], which.ravel()
-        term, grows = np.repeat(np.arange(len(count)), count), each[:, 0] == FUNCTIONS["exp"]
-        one, zero = len(distinct), len(distinct) + 1
-        target = arrays["target"][chosen]
-        return cls(
-            torch.tensor(np.where(target < 0, -1 - target, target), dtype=torch.long),
-            torch.tensor(arrays["coefficient"][chosen], dtype=torch.float64),
-            [(n, torch.tensor(rows[:, 1], dtype=torch.long), torch.tensor(rows[:, 2])) for n, rows in groups.items()],
-            _rows(term[~grows], which[~grows], len(count), one),
-            _rows(term[grows], which[grows], len(count), zero),
-        )
-
-    def added_to(self, sums: Tensor, known: Tensor) -> Tensor:
-        """The sums with the terms of known values (..., intermediate values and quantities) added."""
-        arguments = [(name, weight * known.index_select(-1, which)) for name, which, weight in self.functions]
-        functions = [x if name == "exp" else _TORCH[name](x) for name, x in arguments]
-        batch = known.shape[:-1]
-        values = torch.cat([*functions, known.new_ones(*batch, 1), known.new_zeros(*batch, 1)], -1)
-        product, exponent = known.new_ones(()), known.new_zeros(())
-        for column in self.factors.unbind(1):
-            product = product * values.index_select(-1, column)
-        for column in self.exponents.unbind(1):
-            exponent = exponent + values.index_select(-1, column)
-        product = self.coefficient * (product * torch.exp(exponent))
-        return sums.index_add(-1, self.target, product.expand(*batch, -1))
-
-
-def _depths(arrays: Mapping[str, np.ndarray]) -> np.ndarray:
-    """(terms,) how many intermediate values a term is made of one after another; those that go to inputs come last."""
-    first, parameter, target = arrays["first_factor"], arrays["parameter"], arrays["target"]
-    depth, of_value = np.zeros(len(target), dtype=int), dict[int, int]()
-    for t in np.flatnonzero(target < 0):
-        made_of = parameter[first[t] : first[t + 1]]
-        depth[t] = max((1 + of_value[k] for k in made_of.tolist() if k < 0), default=0)
-        of_value[int(target[t])] = max(depth[t], of_value.get(int(target[t]), 0))
-    depth[target >= 0] = 1 + max(of_value.values(), default=-1)
-    return depth
-
-
-def _rows(term: np.ndarray, place: np.ndarray, terms: int, none: int) -> Tensor:
-    """(terms, most) the places of each term, in their order; short rows are filled up with `none`."""
-    count = np.bincount(term, minlength=terms)
-    rows = np.full((terms, int(count.max(initial=0))), none)
-    rows[term, np.arange(len(term)) - np.repeat(np.cumsum(count) - count, count)] = place
-    return torch.from_numpy(rows)
-
-
 class InputMap:
     """The map from tensors by name to flat inputs (*batch, total)."""
 
     def __init__(self, scene: Scene) -> None:
         compiled = scene.compiled
-        self._names, self._layout, self._domain = compiled.names, compiled.layout, compiled.domain
+        self._names, self._layout = compiled.names, compiled.layout
         self._given = compiled.given
         self._without_effect = _without_effect(scene)
         self._shapes = compiled.shapes
         self._theta = torch.tensor(compiled.theta, dtype=torch.float64)
-        self._map = ParameterMap(scene)
+        self._of_quantities = InputsOfQuantities(compiled)
 
     def __call__(
         self, values: Mapping[str, Tensor | float] | None, inputs: Mapping[str, Tensor] | None = None
@@ -161,7 +49,8 @@ class InputMap:
         batches = {name: self._batch_of_value(name, value) for name, value in values.items()}
         batches |= {name: self._batch_of_array(name, array) for name, array in arrays.items()}
         batch = broadcast(batches)
-        flat = self._map(self._quantities(values, batch))
+        theta = self._quantities(values, batch)
+        flat = respond(self._of_quantities, theta.reshape(math.prod(batch), theta.shape[-1])).reshape(*batch, -1)
         if not arrays:
             return flat
         parts = []
@@ -201,43 +90,13 @@ class InputMap:
         if not values:
             return self._theta.expand(*batch, -1)
         each = [values.get(name, default) for name, default in zip(self._names, self._theta, strict=True)]
-        theta = torch.stack([torch.as_tensor(v, dtype=torch.float64).expand(batch) for v in each], -1)
-        rows = theta.reshape(-1, len(each))
-        out: Tensor = _Checked.apply(self._domain.check_quantities, rows)  # type: ignore[no-untyped-call]
-        return out.reshape(theta.shape)
+        return torch.stack([torch.as_tensor(v, dtype=torch.float64).expand(batch) for v in each], -1)
 
 
 def dtype_of(values: Mapping[str, Tensor | float], arrays: Mapping[str, Tensor]) -> torch.dtype:
     """What comes of these: float32 where all tensors are, else float64."""
     own = {t.dtype for t in (*values.values(), *arrays.values()) if isinstance(t, Tensor)}
     return torch.float32 if own == {torch.float32} else torch.float64
-
-
-class _Checked(Function):
-    """(check, rows) -> rows, once `check` has seen their numbers; under every transform."""
-
-    @staticmethod
-    def forward(check: Callable[[np.ndarray], None], rows: Tensor) -> Tensor:
-        check(rows.detach().numpy())
-        return rows.clone()
-
-    @staticmethod
-    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: Tensor) -> None:
-        pass
-
-    @staticmethod
-    def backward(ctx: Any, rows_bar: Tensor) -> tuple[None, Tensor]:
-        return None, rows_bar
-
-    @staticmethod
-    def jvp(ctx: Any, _: None, rows_dot: Tensor) -> Tensor:
-        return rows_dot.clone()
-
-    @staticmethod
-    def vmap(info: Any, in_dims: tuple[None, int], check: Any, rows: Tensor) -> tuple[Tensor, int]:
-        every = rows.movedim(in_dims[1], 0)
-        out: Tensor = _Checked.apply(check, every.flatten(0, 1))  # type: ignore[no-untyped-call]
-        return out.reshape(every.shape), 0
 
 
 def _without_effect(scene: Scene) -> dict[str, str]:

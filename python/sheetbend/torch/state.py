@@ -16,7 +16,7 @@ from ..errors import InputError
 _WHOLE = 2  # numbers at the end of a row: the substep, and what an impact has left
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class State:
     """Everything that the next substep starts from, of one scene or of a batch of scenes.
 
@@ -74,6 +74,10 @@ class State:
     def detach(self) -> State:
         """The same state, cut off from how it was computed: gradients stop here."""
         return State(self.numbers.detach(), self.dtype, self.hidden)
+
+    def __repr__(self) -> str:
+        *batch, particles, _ = self.positions.shape
+        return f"State(batch={tuple(batch)}, particles={particles}, dtype={self.dtype})"
 
     def __getitem__(self, index: Any) -> State:
         """Some states of a batch."""

@@ -136,6 +136,9 @@ class Stepper:
                 explains; a stepper does not.
             UnbalancedError, UnconvergedError: as `sheetbend.simulate`.
         """
+        if not isinstance(state, State):
+            fix = "give what `start`, or the call before, returned"
+            raise InputError("state", "is no State", type(state).__name__, fix)
         flat = self._default if inputs is None else inputs
         numbers = state.numbers
         if numbers.shape[-1] != self._width:

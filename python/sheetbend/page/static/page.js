@@ -46,10 +46,14 @@ const page = {
     this.element("motion").querySelector("h2").textContent = motion.frames < 2 ? "Shape at rest" : "Motion";
     this.space.show(motion);
     this.switches();
-    const drawn = motion.frames < motion.recorded ? `${motion.frames} of ${motion.recorded} frames are drawn. ` : "";
-    const strained = motion.sheets.filter((s) => s.largestStrain > 0);
-    const words = strained.map((s) => `${s.name}: the warmest color is a strain of ${(100 * s.largestStrain).toPrecision(2)} %. `);
-    this.element("about-motion").textContent = drawn + words.join("") + (this.space.cell ? `A cell of the floor is ${length(this.space.cell)}. ` : "") + (motion.heldOut.some(Boolean) && motion.frames > 1 ? "Shaded times were held out: the fit did not see them." : "");
+    const strained = motion.sheets.filter((s) => s.largestStrain > 0), about = [
+      this.space.cell && `Drag to turn, scroll to zoom. A cell of the floor is ${length(this.space.cell)}.`,
+      motion.frames < motion.recorded && `${motion.frames} of ${motion.recorded} frames are drawn.`,
+      motion.hasBodies && "A rigid body is drawn as the box of even density that has its mass and inertia, with a line to the origin of its frame.",
+      ...strained.map((s) => `${s.name}: the warmest color is a strain of ${(100 * s.largestStrain).toPrecision(2)} %.`),
+      motion.heldOut.some(Boolean) && motion.frames > 1 && "Shaded times were held out: the fit did not see them.",
+    ];
+    this.element("about-motion").textContent = about.filter(Boolean).join(" ");
     const marker = this.element("marker");
     marker.replaceChildren(...motion.markers.map((name, m) => new Option(name, m)));
     // Points of a cloud are other ones in every frame: only their distances mean something over time.
