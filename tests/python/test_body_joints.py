@@ -110,6 +110,49 @@ def test_torsion_spring_has_its_period_and_viscosity_its_decay() -> None:
     assert joint.angle(motion) == pytest.approx([2.0 * tau * (1.0 - np.exp(-0.2 / tau))], rel=2e-3)
 
 
+def tray(**options: object) -> tuple[sb.Scene, sb.Joint]:
+    """A body on an upright slider beside its center, in a frame that leans."""
+    scene = sb.Scene("tray")
+    body = scene.add_body("tray", of=INERTIA.moved((0.01, 0.02, -0.01)), rotation=(0.3, -0.2, 0.5), at=(0.1, 0.0, 0.2))
+    return scene, sb.slider(None, body, at=AT, axis=(0.0, 0.0, 1.0), **options)  # type: ignore[arg-type]
+
+
+def hung(t: np.ndarray, k: float, c: float, rest: float) -> np.ndarray:
+    """m, the shift of a mass of 0.3 kg on a spring and a damper, from rest in gravity."""
+    w, decay = np.sqrt(k / 0.3 - (c / 0.6) ** 2), c / 0.6
+    end = rest - 0.3 * 9.81 / k
+    return np.asarray(end * (1.0 - np.exp(-decay * t) * (np.cos(w * t) + decay / w * np.sin(w * t))))
+
+
+@pytest.mark.parametrize("method", ["direct", "implicit"])
+def test_a_slider_with_spring_and_damper_swings_as_the_closed_form(method: str) -> None:
+    scene, joint = tray(stiffness=120.0, rest=0.01, viscosity=0.8)
+    times = np.linspace(0.0, 0.4, 9)
+    motion = sb.simulate(scene, times, sb.Solver(h=5e-4, method=method))
+    assert joint.shift(motion) == pytest.approx(hung(times, 120.0, 0.8, 0.01), abs=3e-5)
+    moved = sb.simulate(scene, times, sb.Solver(h=5e-4, method=method), values={"slider_lower_z": 0.03})
+    assert abs(joint.shift(moved) - joint.shift(motion)).max() > 1e-3  # with the scene's place: of another point
+    assert joint.shift(moved, {"slider_lower_z": 0.03}) == pytest.approx(joint.shift(motion), abs=1e-9)
+    report = sb.check_gradients(scene, [0.0, 2e-3, 4e-3], sb.Solver(h=5e-4, method=method), samples=1)
+    assert report.passed, str(report)
+    scene, joint = tray(viscosity=0.8)
+    t, tau = 0.3, 0.3 / 0.8
+    fallen = -9.81 * tau * (t - tau * (1.0 - np.exp(-t / tau)))
+    assert joint.shift(sb.simulate(scene, [t], sb.Solver(h=5e-4, method=method))) == pytest.approx([fallen], rel=1e-3)
+
+
+def test_a_slider_gives_its_spring_rest_and_damper_from_its_motion() -> None:
+    solver, times, truth = sb.Solver(h=1e-3), np.arange(41) / 100, (120.0, 0.01, 0.8)
+    names = ["slider_stiffness", "slider_rest", "slider_viscosity"]
+    scene, joint = tray(stiffness=truth[0], rest=truth[1], viscosity=truth[2])
+    x = joint.lower.pose(sb.simulate(scene, times, solver))[0][:, None]
+    scene, joint = tray(stiffness=100.0, viscosity=0.5)
+    seen = sb.on_body(joint.lower, [(0.0, 0.0, 0.0)])
+    recording = sb.Recording(x, times)
+    found = sb.fit(scene, recording, names, markers=seen, solver=solver, sigma=1e-4, start_time=0.0, refine=False)
+    assert [found.values[name] for name in names] == pytest.approx(truth, rel=1e-6)
+
+
 def test_servo_follows_and_a_torque_turns_body_and_rotor() -> None:
     moment = INERTIA.matrix[2, 2]
     times = np.linspace(0.0, 0.4, 21)
@@ -230,3 +273,8 @@ def test_bad_joints_are_refused() -> None:
         gate(9.81, tilt_stiffness=-1.0)
     with pytest.raises(sb.SceneError, match="viscosity: must not be negative"):
         gate(9.81, viscosity=-0.1)
+    for make in (wheel, tray):
+        with pytest.raises(sb.SceneError, match="rest: is that of a spring, and there is none"):
+            make(rest=0.1)
+        with pytest.raises(sb.SceneError, match="stiffness: must be positive"):
+            make(stiffness=0.0)

@@ -216,6 +216,18 @@ def test_configured_servo_motor_force_and_start(tmp_path: Path) -> None:
     assert {"push_z", "elbow_torque_1", "elbow_rotor"} <= set(scene.quantities)
 
 
+def test_a_configured_slider_has_a_spring_and_a_damper(tmp_path: Path) -> None:
+    given = 'kind = "slider"\nstiffness = 80.0\nrest = -0.02\nviscosity = 0.5\nname = "shoulder"'
+    text = MOVED.replace('kind = "hinge"\nname = "shoulder"', given)
+    scene = moved(tmp_path, text.replace("servo = { times = [0.0, 0.1, 0.2], values = [0.0, 0.3, 0.2] }\n", ""))
+    units = {name: scene.quantities[f"shoulder_{name}"] for name in ("stiffness", "rest", "viscosity")}
+    assert {name: (q.value, q.unit) for name, q in units.items()} == {
+        "stiffness": (80.0, "N/m"),
+        "rest": (-0.02, "m"),
+        "viscosity": (0.5, "N s/m"),
+    }
+
+
 @pytest.mark.parametrize(
     ("old", "new", "match"),
     [

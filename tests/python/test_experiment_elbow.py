@@ -40,6 +40,21 @@ def test_flights_are_predicted_from_their_first_frames() -> None:
     assert (errors.max(axis=0) < [2e-3, 1.4, 2e-3, 2.0]).all()
 
 
+def test_weights_that_know_the_noise_gain_little_over_a_line_through_four_frames() -> None:
+    from blocks import flights
+    from first_frames import BEGIN, covariances, line, path, spread, weights
+
+    t = np.arange(15.0)
+    flat, noise = [np.eye(15)] * 3, covariances(15, BEGIN)
+    assert weights(t, 4, flat[0]) == pytest.approx(line(t)[-1] @ np.linalg.pinv(line(t)[:4]))
+    assert weights(t, 4, noise[0]) @ line(t)[:4] == pytest.approx([1.0, 14.0])  # of any line, exactly
+    ours = path(flights()[1])
+    best, plain = (np.linalg.norm(spread(ours, 4, noise, own)) for own in (noise, flat))
+    assert 0.97 * plain < best < plain < 0.8  # mm
+    drawn = np.linalg.cholesky(noise[0]) @ np.random.default_rng(0).standard_normal((15, 4000))
+    assert np.std(weights(t, 4, noise[0]) @ drawn[:4] - drawn[-1]) == pytest.approx(best / np.sqrt(3.0), rel=0.05)
+
+
 @pytest.mark.slow
 def test_gravity_of_two_flights_is_that_of_the_cube() -> None:
     from blocks import experiment, flights, parameters

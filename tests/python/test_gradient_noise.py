@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.mesh import icosphere
+from sheetbend.motion.gradient_probe import Probe
 from sheetbend.motion.gradient_report import GradientReport
 from sheetbend.scene.compiled import CompiledScene
 
@@ -51,6 +52,35 @@ def test_what_is_hardly_felt_is_no_alarm(density: float) -> None:
     scene = sb.rope(0.5, 5, density=1.0, EI=1e-3, EA=1e3, drag_linear=density, clamp_start=(1, 0, 0))
     report = sb.check_gradients(scene, TIMES, sb.Solver(h=1 / 400))
     assert report.passed, str(report)
+
+
+@pytest.mark.parametrize("method", ["direct", "implicit", "newton"])
+def test_joints_that_fall_freely_are_no_alarm(method: str) -> None:
+    """Their forces are rounding, and so is the gradient with respect to their compliance (4e-10)."""
+    scene = sb.Scene("dropped")
+    box = sb.Inertia.box(0.2, (0.2, 0.02, 0.02))
+    upper = scene.add_body("upper", of=box, at=(0.0, 0.0, 0.5))
+    lower = scene.add_body("lower", of=box, at=(0.15, 0.0, 0.4), rotation=(0.0, 0.7, 0.0))
+    sb.slider(None, upper, at=(0.0, 0.0, 0.5), axis=(0.0, 0.0, 1.0), name="rail")
+    sb.hinge(upper, lower, at=(0.08, 0.01, 0.47), axis=(0.0, 1.0, 0.0), stiffness=8.0)
+    report = sb.check_gradients(scene, np.arange(4) * 5e-4, sb.Solver(h=5e-4, method=method))
+    assert report.passed, str(report)
+    rows = {row.name: row for row in report.rows}
+    assert rows["compliance"].unfelt and not rows["position"].unfelt
+
+
+@pytest.mark.parametrize("range_", [1e-9, 1e-8, 3e-7])
+def test_a_loss_that_stops_to_change_is_no_alarm(range_: float) -> None:
+    """A compliance of zero of a hinge on a drum: beyond 1e-6 the loss changed no more, and differences there were zero
+    with hardly an error, which passed for the best."""
+    slope = 10.0
+
+    def simulate(inputs: np.ndarray, *_: object) -> dict[str, np.ndarray]:
+        return {"positions": np.array([1.0, slope * range_ * math.tanh(inputs[0] / range_)])}
+
+    probe = Probe(SimpleNamespace(simulate=simulate), np.zeros(1), [1], np.ones(2), np.array([slope]))
+    found, error = probe.differences(np.ones(1), 1e-4 * probe.size(0.0, 1e-3, True, slope), slope)
+    assert abs(found - slope) < error < 0.3 * slope
 
 
 def mistaken(monkeypatch: pytest.MonkeyPatch, name: str, factor: float) -> None:

@@ -10,14 +10,15 @@ from ..objects.pivot import SLIP_ANGLE
 from .section import Finite, Line, Name, Quaternion, Section, Vector, key
 
 GROUND = "ground"
+SPRING = ("stiffness", "rest", "viscosity")
 TILT = ("tilt_stiffness", "tilt_damping")
 DRY = ("friction", "slip_angle")
 LIMITS = ("limits", "limit_stiffness", "limit_damping", "limit_depth")
 JOINTS: dict[str, tuple[str, ...]] = {
     "ball": ("compliance",),
-    "hinge": ("axis", "rate", "stiffness", "rest", "viscosity", "servo", "torque", "rotor", *DRY, *LIMITS, *TILT),
+    "hinge": ("axis", "rate", *SPRING, "servo", "torque", "rotor", *DRY, *LIMITS, *TILT),
     "universal": ("axes",),
-    "slider": ("axis", "rate", *LIMITS),
+    "slider": ("axis", "rate", *SPRING, *LIMITS),
     "cylinder": ("axis", "rate", "turn_rate"),
     "fixed": (),
 }
@@ -95,9 +96,13 @@ class JointSection(Section):
     axes: list[Vector] | None = key(None, "of a universal joint: the two bodies' axes", min_length=2, max_length=2)
     rate: Finite = key(0.0, "at the start: of a hinge's angle, rad/s; of a slider or cylinder along the axis, m/s")
     turn_rate: Finite = key(0.0, "of a cylinder's angle at the start", "rad/s")
-    stiffness: Finite | None = key(None, "of a hinge's spring: <name>_stiffness", "N m/rad", gt=0)
-    rest: Finite = key(0.0, "the angle at which that spring rests, counted from the start: <name>_rest", "rad")
-    viscosity: Finite | None = key(None, "of a hinge, torque over rate: <name>_viscosity", "N m s/rad", gt=0)
+    stiffness: Finite | None = key(None, "of the spring of a hinge or slider: <name>_stiffness", "N m/rad or N/m", gt=0)
+    rest: Finite = key(
+        0.0, "the angle or shift at which that spring rests, counted from the start: <name>_rest", "rad or m"
+    )
+    viscosity: Finite | None = key(
+        None, "of a hinge or slider, torque or force over rate: <name>_viscosity", "N m s/rad or N s/m", gt=0
+    )
     friction: Finite | None = key(None, "of a hinge, dry: <name>_friction, Coulomb's torque", "N m", gt=0)
     slip_angle: Finite = key(SLIP_ANGLE, "how far a hinge with dry friction gives before it slides", "rad", gt=0)
     servo: Knots | None = key(

@@ -67,23 +67,25 @@ class Probe:
 
     def differences(self, direction: np.ndarray, step: float, exact: float) -> tuple[float, float]:
         """Central differences with one Richardson step, and their error, at the first step size where that is small, or
-        at the one where truncation and rounding together are least.
+        at the one where truncation and rounding together are least, among those that agree with smaller ones.
 
         No single step suits all: rounding drowns a faint gradient at small ones, and rigid links turn soft at large
         ones. How much halving the step changes the differences tells their truncation error (Ridders 1982).
         """
-        best = np.nan, np.inf
+        found: list[tuple[float, float, float]] = []  # size, differences, error
         for factor in STEP_FACTORS:
             size = step * factor
             try:
                 coarse, fine = self._central(direction, size), self._central(direction, size / 2.0)
             except (_core.Diverged, _core.Unconverged):  # a step as large as a mass
                 continue
-            error = abs(fine - coarse) + self.loudness / size
-            if error < best[1]:
-                best = (4.0 * fine - coarse) / 3.0, error
-            if error <= ENOUGH * DIFFERENCES_BOUND * abs(exact):
+            found.append((size, (4.0 * fine - coarse) / 3.0, abs(fine - coarse) + self.loudness / size))
+            if found[-1][2] <= ENOUGH * DIFFERENCES_BOUND * abs(exact):
                 break
+        best = np.nan, np.inf
+        for _, value, error in sorted(found):  # a loss that stops to change at large steps has no derivative of zero
+            if error < best[1] and (np.isinf(best[1]) or abs(value - best[0]) <= error + best[1]):
+                best = value, error
         return best
 
     def _central(self, direction: np.ndarray, step: float) -> float:

@@ -27,8 +27,9 @@ class GradientRow:
         left_out: entries that were not tested, because they have no derivative: compliances of rigid constraints that
             follow from one another.
         noise: what differences may be off by for their own error (infinite where none could be taken).
-        unfelt: moving any tested entry by its own size changes the loss by less than rounding does, by the adjoint and
-            by complex step; relative errors of such a gradient mean nothing.
+        unfelt: moving any tested entry by its own size changes the loss by less than rounding does, or the gradient is
+            no larger than what other last digits of the inputs make of it; for the adjoint and for complex step.
+            Relative errors of such a gradient mean nothing.
     """
 
     name: str

@@ -234,7 +234,7 @@ def _row(name: str, size: int, entries: Sequence[_Entry], left_out: int = 0) -> 
     """The row of the report for some tested entries, with errors relative to the largest."""
     columns = np.array([(e.gradient, e.exact, e.rough, e.error, e.faint, e.rounding) for e in entries]).T
     gradient, exact, rough, error, faint, rounding = columns
-    unfelt = bool((np.maximum(np.abs(gradient), np.abs(exact)) <= faint).all())
+    unfelt = bool((np.maximum(np.abs(gradient), np.abs(exact)) <= np.maximum(faint, rounding)).all())
     scale, worst = float(np.abs(exact).max()), float(np.abs(gradient).max())
     if scale == 0.0:
         return GradientRow(

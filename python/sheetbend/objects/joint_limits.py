@@ -127,8 +127,7 @@ def _check(name: str, stiffness: float, damping: float | None, depth: float, uni
 
 def _row(made: Making, unit: str) -> tuple[str, list[list[int]], list[Expression | float]]:
     """Kind, stencil and weights of a stop."""
-    (p, *a), (q, *b) = made.nodes
     if unit == "rad":
+        (_, *a), (_, *b) = made.nodes
         return "angle_stop", [[*a, *b]], [*made.direction(0, 1), *made.direction(0, 2), *made.direction(1, 1)]
-    places = [*made.upper.coordinates(made.places[0]), *made.lower.coordinates(made.places[1])]
-    return "slide_stop", [[p, q, *a, *b]], [*places, *made.direction(0, 0)]
+    return "slide_stop", *made.along_row(0)

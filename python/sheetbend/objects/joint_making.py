@@ -12,7 +12,7 @@ from ..arrays.checks import check_label, finite, is_number
 from ..errors import SceneError
 from ..quantities.expression import Array, Expression, cross, expressions, names_in, numbers, terms_of, vector
 from ..quantities.quantities import ZERO_OR_MORE, Term
-from ..scene.body import AXES, GROUND, PLACE, Body, FrameState, HasMotion
+from ..scene.body import AXES, GROUND, PLACE, Body, FrameState, HasMotion, Values
 from ..scene.given import check_scene
 from ..scene.scene import Scene
 from .chain import unit_vector
@@ -48,6 +48,14 @@ class Joint:
         first, second = (body.pose(motion)[1] @ own.T for body, own in sides)
         e, f, u = first[..., 1], first[..., 2], second[..., 1]
         return np.asarray(np.arctan2((f * u).sum(axis=-1), (e * u).sum(axis=-1)))
+
+    def shift(self, motion: HasMotion | ArrayLike, values: Values = None) -> Array:
+        """(...,) m, by which the lower body has slid along the joint's axis of the upper one, from how they were given;
+        along a trajectory or at positions as of `angle`, with `values` as of `Body.pose`."""
+        (x, turned), (y, frame) = (body.pose(motion, values) for body in (self.upper, self.lower))
+        at = self.lower.values(values, names_in(self.places[0]) | names_in(self.places[1]))
+        first, second = (numbers(place, at) for place in self.places)
+        return np.asarray(((y + frame @ second - x - turned @ first) * (turned @ self.axes[0][0])).sum(axis=-1))
 
 
 def ground(scene: Scene) -> Body:
@@ -191,10 +199,15 @@ class Making:
 
     def along(self) -> None:
         """Keep the lower place on the line through the upper one."""
+        for_both = [self.along_row(k) for k in (1, 2)]
+        self.constrain("along", "line", [one for (one,), _ in for_both], [[*weights, 0.0] for _, weights in for_both])
+
+    def along_row(self, which: int) -> tuple[list[list[int]], list[Expression | float]]:
+        """How far the lower place lies from the upper one along one of `axes`: the stencil, and the weights of its
+        points and of its direction."""
         (p, *a), (q, *b) = self.nodes
         places = [*self.upper.coordinates(self.places[0]), *self.lower.coordinates(self.places[1])]
-        weights = [[*places, *self.direction(0, k), 0.0] for k in (1, 2)]
-        self.constrain("along", "line", [[p, q, *a, *b]] * 2, weights)
+        return [[p, q, *a, *b]], [*places, *self.direction(0, which)]
 
     def direction(self, side: int, which: int) -> Array:
         """(3,) expressions: one of `axes` along a body's principal axes."""

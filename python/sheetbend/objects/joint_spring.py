@@ -1,10 +1,10 @@
-"""What turns a hinge or resists it: a torsion spring, viscosity, dry friction, a servo, or the torque of a motor over
-time; and how stiffly it holds its axis.
+"""What moves a hinge or a slider or resists it: a spring and viscosity; and of a hinge dry friction, a servo, the
+torque of a motor over time, and how stiffly it holds its axis.
 
-Spring, viscosity, servo and motor are the constraint `joint_angle`, whose dial is the x of a hidden node: pinned at
-zero for a spring, driven for a servo. The dial of a motor is free: the rotor, an axis with inertia and no weight, which
-turns with the joint and on which the torque acts. That of dry friction (`joint_friction`) is the angle at which the
-hinge sticks.
+Of a slider, spring and viscosity are the constraint `along` in its axis. Of a hinge, they, servo and motor are the
+constraint `joint_angle`, whose dial is the x of a hidden node: pinned at zero for a spring, driven for a servo. The
+dial of a motor is free: the rotor, an axis with inertia and no weight, which turns with the joint and on which the
+torque acts. That of dry friction (`joint_friction`) is the angle at which the hinge sticks.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from ..errors import SceneError
 from ..quantities.expression import Expression
 from ..quantities.quantities import Term
 from ..scene.scene import Array
+from .joint_limits import PER, RATE, SIZE
 from .joint_making import Making
 from .pivot import add_slip_angle, check_friction
 
@@ -24,12 +25,18 @@ Knots = tuple[ArrayLike, ArrayLike]  # times (knots,) s and values (knots,)
 MOST_NAMED = 50  # knots of a torque that are quantities
 
 
-def add_spring(made: Making, stiffness: float | None, rest: float, viscosity: float | None) -> None:
-    """A torsion spring, viscosity, or both, against a dial at zero."""
+def add_spring(made: Making, unit: str, stiffness: float | None, rest: float, viscosity: float | None) -> None:
+    """A spring, viscosity, or both: against a hinge's angle ("rad") or a slider's shift ("m")."""
+    if stiffness is None and is_number(rest) and rest != 0.0:
+        fix = "add a stiffness, or leave rest out"
+        raise SceneError(f"{made.name}.rest", "is that of a spring, and there is none", rest, fix)
     if stiffness is None and viscosity is None:
         return
-    dial = made.scene.add_hidden(np.zeros((1, 3)), 1.0, pinned=True)
-    _angle(made, "spring", int(dial[0]), stiffness, rest, viscosity)
+    if unit == "rad":
+        dial = made.scene.add_hidden(np.zeros((1, 3)), 1.0, pinned=True)
+        _angle(made, "spring", int(dial[0]), stiffness, rest, viscosity)
+    else:
+        _resist(made, "along", "spring", *made.along_row(0), unit, stiffness, rest, viscosity)
 
 
 def add_servo(made: Making, knots: Knots, stiffness: float | None, rest: float, viscosity: float | None) -> None:
@@ -99,7 +106,7 @@ def hold_axis(made: Making, stiffness: float | None, damping: float | None) -> N
         made.name_damping(group, f"{made.name}_tilt_damping", damping, "N m s/rad")
 
 
-def _turn(made: Making, dial: int) -> tuple[list[Expression], list[list[int]]]:
+def _turn(made: Making, dial: int) -> tuple[list[Expression | float], list[list[int]]]:
     """What the angle of a hinge from a dial is made of: the weights of its directions, and the stencil."""
     (_, *a), (_, *b) = made.nodes
     return [*made.direction(0, 1), *made.direction(0, 2), *made.direction(1, 1)], [[*a, *b, dial]]
@@ -120,27 +127,41 @@ def _check(field: str, stiffness: float | None, loss_field: str, loss: float | N
 
 
 def _angle(made: Making, label: str, dial: int, stiffness: float | None, rest: float, viscosity: float | None) -> None:
-    """A group `joint_angle`, whose numbers are quantities where they are given."""
+    """A group `joint_angle` from a dial."""
+    weights, nodes = _turn(made, dial)
+    _resist(made, "joint_angle", label, nodes, weights, "rad", stiffness, rest, viscosity)
+
+
+def _resist(
+    made: Making,
+    kind: str,
+    label: str,
+    nodes: list[list[int]],
+    weights: list[Expression | float],
+    unit: str,
+    stiffness: float | None,
+    rest: float,
+    viscosity: float | None,
+) -> None:
+    """A group of one constraint, whose numbers are quantities where they are given. It is rigid without them."""
     scene, name = made.scene, made.name
     _check(f"{name}.stiffness", stiffness, f"{name}.viscosity", viscosity)
     if not is_number(rest):
-        raise SceneError(f"{name}.rest", "must be a finite number", rest, "give rad")
+        raise SceneError(f"{name}.rest", "must be a finite number", rest, f"give {unit}")
     zero: Expression | float = 0.0
     if stiffness is not None:
-        zero = Expression.of(scene.add_quantity(f"{name}_rest", rest, "rad", positive=False, scale=0.1))
-    turn, nodes = _turn(made, dial)
-    weights = [*turn, zero]
+        zero = Expression.of(scene.add_quantity(f"{name}_rest", rest, unit, positive=False, scale=SIZE[unit]))
     one, none = np.ones(1), np.zeros(1)
     damped = none if viscosity is not None else None
     if stiffness is None and viscosity is not None:
-        group = made.constrain("joint_angle", label, nodes, [weights], viscosity=none)
+        group = made.constrain(kind, label, nodes, [[*weights, zero]], viscosity=none)
     else:
         compliance = None if stiffness is None else one
-        group = made.constrain("joint_angle", label, nodes, [weights], compliance, damped)
+        group = made.constrain(kind, label, nodes, [[*weights, zero]], compliance, damped)
     if stiffness is not None:
-        made.name_stiffness(group, f"{name}_stiffness", stiffness, "N m/rad")
+        made.name_stiffness(group, f"{name}_stiffness", stiffness, PER[unit])
     if viscosity is not None:
-        made.name_damping(group, f"{name}_viscosity", viscosity, "N m s/rad")
+        made.name_damping(group, f"{name}_viscosity", viscosity, RATE[unit])
 
 
 def _knots(field: str, knots: Knots) -> tuple[Array, Array]:

@@ -110,7 +110,7 @@ def hinge(
     if servo is not None:
         add_servo(made, servo, stiffness, rest, viscosity)
     else:
-        add_spring(made, stiffness, rest, viscosity)
+        add_spring(made, "rad", stiffness, rest, viscosity)
     add_friction(made, friction, slip_angle)
     add_motor(made, torque, rotor)
     add_limits(made, "rad", limits, limit_stiffness, limit_damping, limit_depth)
@@ -145,6 +145,9 @@ def slider(
     axis: ArrayLike,
     name: str = "slider",
     rate: float = 0.0,
+    stiffness: float | None = None,
+    rest: float = 0.0,
+    viscosity: float | None = None,
     limits: ArrayLike | None = None,
     limit_stiffness: float | None = None,
     limit_damping: float | None = None,
@@ -152,8 +155,9 @@ def slider(
 ) -> Joint:
     """Let one body slide along a line of the other without turning against it.
 
-    Quantities: its place as of `ball`; `<name>_shift` m and `<name>_rate` m/s, the start of the lower body; with
-    limits `<name>_limit_low`, `<name>_limit_high` and `<name>_limit_depth` m, `<name>_limit_stiffness` N/m, and
+    Quantities: its place as of `ball`; `<name>_shift` m and `<name>_rate` m/s, the start of the lower body; with a
+    spring `<name>_stiffness` N/m and `<name>_rest` m; with viscosity `<name>_viscosity` N s/m; with limits
+    `<name>_limit_low`, `<name>_limit_high` and `<name>_limit_depth` m, `<name>_limit_stiffness` N/m, and
     `<name>_limit_damping` N s/m where given.
 
     Args:
@@ -161,6 +165,9 @@ def slider(
         at: (3,) m, a point of the lower body in the world that stays on the line.
         axis: (3,) the line's direction in the world.
         rate: m/s, at the start.
+        stiffness: of a spring along the line, N/m.
+        rest: m, the shift at which it rests. The shift counts from how the bodies were given.
+        viscosity: force over the rate, N s/m.
         limits: (low, high) m, between which the body slides freely, counted from how the bodies were given.
         limit_stiffness, limit_damping, limit_depth: N/m, N s/m and m, as of `hinge`; the depth is 5 mm by default.
 
@@ -171,6 +178,7 @@ def slider(
     made.hang(shift=rate, fixed=True)
     made.along()
     made.across([(0, 1), (0, 2), (1, 2)])
+    add_spring(made, "m", stiffness, rest, viscosity)
     add_limits(made, "m", limits, limit_stiffness, limit_damping, limit_depth)
     return made.joint()
 
