@@ -34,7 +34,7 @@ class BendingYield:
 
 
 def bending_yield(curve: Curve) -> BendingYield:
-    """Fit a spring beside one that slides to all points of a curve in their order, by least squares.
+    """Fit an elastic spring and a sliding one, in parallel, to all points of a bending curve by least squares.
 
     M = B (kappa - share set) + offset, where the set, zero at first, follows the curvature at the distance
     `yield_curvature`. After a turn the slope is B, and (1 - share) B from twice the yield curvature on; the loop is

@@ -84,9 +84,9 @@ def drape(
     """The drape test of BS 5058 and ISO 9073-9, after Cusick (1965): 30 cm of cloth between plates of 18 cm.
 
     The drape coefficient is the part of the overhanging ring that the shadow covers; 24 and 36 cm are for limp and
-    stiff cloths. A draped cloth has many states of rest. Each start with so many folds leads to one; a laboratory sees
-    one of those of low energy, which differ by several percent, as repeated tests do. The derivative is that of a
-    state as it deforms. Cloth does not touch cloth here: see `DrapeState.hidden`.
+    stiff cloths. A draped cloth has many states of rest, and each start with a number of folds leads to one. A
+    laboratory sees one of those of low energy. They differ by several percent, like repeated tests. The derivative is
+    that of a state as it deforms. Cloth does not touch cloth here: see `DrapeState.hidden`.
 
     Args:
         diameter, plate: of cloth and plates, m.

@@ -162,21 +162,22 @@ def _contradict(misfit: float, freedom: float) -> bool:
 
 @one_blas_thread()
 def fit_fabric(measured: Sequence[Measured], start: Fabric, free: Sequence[str]) -> FabricFit:
-    """Find numbers of a fabric whose tests read what the laboratory has read: least squares, weighted by sigma.
+    """Find the parameters of a fabric whose simulated tests give the readings of a laboratory: weighted least squares.
 
-    Readings fall into one sum whatever their tests are, so numbers that share a test (shear in a bias extension) are
-    found together, and what the readings do not tell is named. Intervals come from the readings' own sigmas. Where the
-    misfit is larger than chance has it, the sigmas of each test are widened by the root of its own misfit (Birge 1932),
-    so that a pull that fits poorly leaves the interval of the weight as it is. Errors of one specimen go together:
-    where readings name their specimens, each specimen counts as a whole (errors clustered by specimen; Liang and Zeger
-    1986), with Student's t of as many degrees of freedom as the errors of a number have (Welch 1947).
+    All readings are fitted together, so parameters that share a test (shear in a bias extension) are found together.
+    Parameters that the readings do not determine are named in the result. Intervals come from the sigmas of the
+    readings. If the misfit of a test is larger than chance explains, its sigmas are multiplied by the root of that
+    misfit (Birge 1932), so a pull that fits poorly does not widen the interval of the weight. Errors of one specimen
+    are correlated: if readings name their specimens, each specimen counts as a whole (errors clustered by specimen;
+    Liang and Zeger 1986), with Student's t of as many degrees of freedom as the errors of a parameter have (Welch
+    1947).
 
     Args:
         measured: at least one.
-        start: where to begin, and the numbers that are not free. A number that it leaves out follows the one it
-            follows in `Fabric`.
-        free: numbers to find: of `Fabric` ("warp", "poisson", "bending_weft"), or of its law as fits name them
-            ("warp_stiffening", "shear_ratio_2"). All but `poisson` are found on a log scale.
+        start: starting values, and the parameters that are not free. One that is left out follows the same parameter
+            as in `Fabric`.
+        free: parameters to find: of `Fabric` ("warp", "poisson", "bending_weft"), or of its law as fits name them
+            ("warp_stiffening", "shear_ratio_2"). All but `poisson` are fitted on a log scale.
 
     Raises:
         InputError: no readings, no or unknown numbers, or numbers that `start` leaves out.

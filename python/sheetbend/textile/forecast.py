@@ -96,11 +96,11 @@ def forecast_pull(
     cycle: int = 0,
     seed: int = 0,
 ) -> PullForecast:
-    """Carry pulls on to strains that they did not reach, with an interval for the load of another specimen.
+    """Forecast pulls beyond their strains, with an interval for the load of another specimen.
 
-    The interval holds the spread of the laws, weighted by how well each follows the growth of the load (`weigh`: equal
-    chances before, posterior ones after), the uncertainty of each law's numbers, the wandering of the load about its
-    law, and the scatter of specimens. In the range of the fit it is an interval about the mean curve too.
+    The interval contains the spread of the laws, weighted by how well each follows the growth of the load (`weigh`:
+    equal chances before, posterior ones after), the uncertainty of each law's numbers, the wandering of the load about
+    its law, and the scatter of specimens. In the range of the fit it is an interval about the mean curve too.
 
     Args:
         curves: of tension, a specimen each; best from a pretension on (`Curve.from_pretension`).

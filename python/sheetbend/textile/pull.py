@@ -114,10 +114,10 @@ def fit_pull(
     """Stiffness and law of one direction from its pulls alone: `fit_fabric` on the readings of `pulled`, with a start
     from the mean curve.
 
-    The other numbers of the fabric are stand-ins, and `poisson` the one that matters: jaws keep a specimen from
-    narrowing, wholly it would read warp/(1 - poisson^2). With 0 in place of 0.3 the stiffness comes out 2 % too high
-    from a strip of 20 x 5 cm, 3 % from FAST-1's 10 x 5 cm, 8 % from KES-FB1's 5 x 20 cm. To fit both directions and the
-    coupling give `fit_fabric` the readings of all tests.
+    The other parameters of the fabric are placeholders. Of these only `poisson` matters: jaws keep a specimen from
+    narrowing, and a specimen that cannot narrow at all has the stiffness warp/(1 - poisson^2). With 0 instead of 0.3
+    the stiffness is 2 % too high from a strip of 20 x 5 cm, 3 % from FAST-1's 10 x 5 cm, 8 % from KES-FB1's 5 x 20 cm.
+    To fit both directions and Poisson's ratio, give `fit_fabric` the readings of all tests.
 
     Args:
         curves, along, way, cycle, error: of `pulled`.

@@ -46,8 +46,8 @@ def shear(
     """The shear test of KES-FB1 (Kawabata 1980): 20 cm wide, 5 cm between jaws, under 10 gf/cm of tension.
 
     One jaw moves along its own direction; across it the tension is kept. G is the slope of the force per width between
-    0.5 and 2.5 degrees. The measured force holds the tension's own part, tension * tan(angle), and lacks what the free
-    sides do not bear: the more, the less the yarns hold them (Y/G). The fabric is elastic, so there is no hysteresis
+    0.5 and 2.5 degrees. The measured force contains tension * tan(angle). It lacks the force of the regions beside the
+    free sides, which bear no load; their size grows as Y/G falls. The fabric is elastic, so there is no hysteresis
     2HG to read.
 
     Args:
