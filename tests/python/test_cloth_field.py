@@ -155,7 +155,7 @@ def test_size_and_length_are_sought_again_where_the_first_minimum_is_left(monkey
     e = seen(6, 0.2 * np.random.default_rng(1).standard_normal(6))
     given: dict[str, Any] = {"smooth": {"cloth_stiffness": sb.Smooth()}, "refine": False, "profiles": False}
     plain = sb.fit(e, parameters=["cloth_warp"], **given)
-    settled, reach, told, windows = behind.settled, behind.reach, list[Any](), list[Any]()
+    likely, reach, told, windows = behind.with_likely_priors, behind.reach, list[Any](), list[Any]()
 
     def leaving(search: Search, problem: FitProblem, beginnings: bool, stopped: bool) -> Reached:
         windows.append(search.windows)
@@ -164,13 +164,13 @@ def test_size_and_length_are_sought_again_where_the_first_minimum_is_left(monkey
 
     def seeking(*given: Any) -> Any:
         told.append(given)
-        return settled(*given)
+        return likely(*given)
 
     monkeypatch.setattr(behind, "reach", leaving)
-    monkeypatch.setattr(behind, "settled", seeking)
+    monkeypatch.setattr(behind, "with_likely_priors", seeking)
     again = sb.fit(e, parameters=["cloth_warp"], **given)
-    assert windows == ["auto", ()] and [given[5] for given in told] == ["auto", ()]
-    start = told[1][2]
+    assert windows == ["auto", ()] and [given[2] for given in told] == ["auto", ()]
+    start = told[1][0].expanded
     assert start["cloth_warp"].initial == pytest.approx(plain["cloth_warp"].value, rel=1e-3)
     assert again["cloth_warp"].value == pytest.approx(plain["cloth_warp"].value, rel=0.02)
 

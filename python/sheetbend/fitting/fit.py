@@ -21,13 +21,13 @@ from ..experiment.wanted import ParameterLike, as_parameters
 from ..minimum.by_ceres import ceres_trouble
 from ..minimum.continuity import joined
 from ..minimum.discretization import Refinement, wanted_refinement
-from ..minimum.field_priors import settled
+from ..minimum.field_priors import with_likely_priors
 from ..minimum.journal import journaled
 from ..minimum.linear_algebra import one_blas_thread
-from ..minimum.problem import FitProblem
 from ..minimum.progress import Observer
 from ..minimum.search import Search
-from ..minimum.smooth import Field, Smooth, with_fields
+from ..minimum.smooth import Smooth, with_fields
+from ..minimum.sought import Sought
 from ..minimum.workers import shared_out
 from ..optional import require
 from ..quantities.parameters import Parameter, Parameters
@@ -38,7 +38,7 @@ from ..scene.scene import Scene
 from .conclusion import Asked, Conclusion, Systematic, conclude
 from .experiments import experiments_of
 from .reached import Reached, reach
-from .result_of import Clock, result_of
+from .result_of import Clock, Compared, result_of
 
 
 @dataclass(frozen=True)
@@ -209,49 +209,36 @@ def fit(
         for e in fitted:
             companions(e, fitted, wanted)
     experiments, found_at, undone = joined(experiments, wanted, threads, progress)
-    fitted = _fitted(experiments)
-    reached, wanted, fields = _minimum(search, asked, fitted, wanted, fields, found_at, undone, beginnings)
+    sought = Sought(_fitted(experiments), wanted, found_at, fields, undone)
+    reached, sought = _minimum(search, asked, sought, beginnings)
     if reached.all_lost:
         asked = asked.without_refits()
-    conclusion, left_out, interrupted = _concluded(reached, experiments, wanted, asked, leave_one_out)
-    corrected = conclusion.at.problem.corrections(conclusion.at.u) | conclusion.corrected
-    at = {e.name: conclusion.at.problem.experiment_at(i, conclusion.at.u) for i, e in enumerate(fitted)}
-    found = [at.get(e.name, e) for e in conclusion.experiments]
-    comparisons = compare(found, wanted, conclusion.values, threads, corrected)
-    result = result_of(reached, conclusion, comparisons, left_out, corrected, fields, interrupted, clock)
+    conclusion, left_out, interrupted = _concluded(reached, experiments, sought.wanted, asked, leave_one_out)
+    compared = _compared(conclusion, left_out, sought, threads)
+    result = result_of(reached, conclusion, compared, sought.fields, interrupted, clock)
     if optimizer == "auto" and (trouble := ceres_trouble()):
         result = replace(
             result, warnings=(*result.warnings, f"SciPy stands in for Ceres, which does not load: {trouble}")
         )
-    return Fit(result, tuple(comparisons), wanted, corrected, conclusion.values)
+    return Fit(result, compared.comparisons, sought.wanted, compared.corrected, conclusion.values)
 
 
-def _minimum(
-    search: Search,
-    asked: Asked,
-    fitted: Sequence[Experiment],
-    wanted: Parameters,
-    fields: tuple[Field, ...],
-    found_at: Parameters | None,
-    undone: str,
-    beginnings: bool,
-) -> tuple[Reached, Parameters, tuple[Field, ...]]:
-    """The minimum, and the parameters and fields with the priors that are most likely there."""
+def _minimum(search: Search, asked: Asked, sought: Sought, beginnings: bool) -> tuple[Reached, Sought]:
+    """The minimum, and what was sought with the priors that are most likely there."""
     threads, progress = asked.threads, search.progress
-    if not undone:
-        wanted, found_at, fields, undone = settled(fitted, wanted, found_at, fields, threads, search.windows, progress)
-    problem = FitProblem(fitted, wanted, threads=threads, expanded=found_at)
+    if not sought.undone:
+        sought = with_likely_priors(sought, threads, search.windows, progress)
+    problem = sought.problem(threads)
     problem.check_start()
     check_given(asked.given, problem)
     check_bootstrap(asked.bootstrap, problem)
-    reached = reach(search, problem, beginnings, undone)
-    if fields and reached.left_its_end and not reached.interrupted:
+    reached = reach(search, problem, beginnings, sought.undone)
+    if sought.fields and reached.left_its_end and not reached.interrupted:
         # Sizes and lengths came from the minimum that was left, so they are sought once more from the lower one.
-        found_at = problem.parameters.starting_at(reached.best.u)
-        wanted, found_at, fields, undone = settled(fitted, wanted, found_at, fields, threads, (), progress)
-        problem = FitProblem(fitted, wanted, threads=threads, expanded=found_at)
-        reached = reach(replace(search, windows=(), starts=()), problem, beginnings, undone)
-    return reached, wanted, fields
+        lower = replace(sought, expanded=problem.parameters.starting_at(reached.best.u))
+        sought = with_likely_priors(lower, threads, (), progress)
+        reached = reach(replace(search, windows=(), starts=()), sought.problem(threads), beginnings, sought.undone)
+    return reached, sought
 
 
 def _concluded(
@@ -268,6 +255,16 @@ def _concluded(
         return conclusion, left_out, interrupted
     except KeyboardInterrupt:
         return conclude(reached, experiments, wanted, asked, None), {}, True
+
+
+def _compared(conclusion: Conclusion, left_out: Mapping[str, Comparison], sought: Sought, threads: int) -> Compared:
+    """All recordings beside what the estimates predict."""
+    problem, u = conclusion.at.problem, conclusion.at.u
+    corrected = problem.corrections(u) | conclusion.corrected
+    at = {e.name: problem.experiment_at(i, u) for i, e in enumerate(sought.experiments)}
+    found = [at.get(e.name, e) for e in conclusion.experiments]
+    comparisons = compare(found, sought.wanted, conclusion.values, threads, corrected)
+    return Compared(tuple(comparisons), left_out, corrected)
 
 
 def _fitted(experiments: Sequence[Experiment]) -> list[Experiment]:

@@ -58,12 +58,25 @@ class Clock:
         return evaluations - self.evaluations, jacobians - self.jacobians
 
 
+@dataclass(frozen=True)
+class Compared:
+    """The recordings beside what the estimates predict.
+
+    Attributes:
+        comparisons: measured against simulated, per experiment.
+        left_out: of the experiments that a fit to the others predicts.
+        corrected: corrections of driven markers by experiment.
+    """
+
+    comparisons: tuple[Comparison, ...]
+    left_out: Mapping[str, Comparison]
+    corrected: dict[str, np.ndarray]
+
+
 def result_of(
     reached: Reached,
     conclusion: Conclusion,
-    comparisons: Sequence[Comparison],
-    left_out: Mapping[str, Comparison],
-    corrected: Mapping[str, np.ndarray],
+    compared: Compared,
     fields: Sequence[Field],
     interrupted: bool,
     clock: Clock,
@@ -71,19 +84,16 @@ def result_of(
     """The result.
 
     Args:
-        comparisons: measured against simulated, per experiment.
-        left_out: of the experiments that a fit to the others predicts.
-        corrected: corrections of driven markers by experiment.
         fields: with their priors.
         interrupted: by Ctrl-C, at any time.
     """
     problem, best, found = reached.problem, reached.best, reached.found
     at, judged, drawn = conclusion.at, conclusion.judged, conclusion.bootstrap
-    parameters = problem.parameters
-    errors = _recordings(reached, conclusion, comparisons, left_out, corrected)
+    parameters, comparisons, left_out = problem.parameters, compared.comparisons, compared.left_out
+    errors = _recordings(reached, conclusion, compared)
     stopped, ahead = unfinished(problem, best, judged)
     missed = unexplained(problem, comparisons, judged.autocorrelation_time, at.u)
-    contradicted = _contradicted(reached, conclusion, comparisons, errors, interrupted) | missed | stopped
+    contradicted = _contradicted(reached, conclusion, compared, errors, interrupted) | missed | stopped
     estimates, limit = at_the_limit(doubtful(judged.estimates, contradicted, missed), at.refits, parameters, at.u)
     values = conclusion.values | parameters.to_physical(limit)
     each = every_end(reached.ends, found.raced)
@@ -152,24 +162,18 @@ def _warnings(
         yield from implausible(problem)
 
 
-def _recordings(
-    reached: Reached,
-    conclusion: Conclusion,
-    comparisons: Sequence[Comparison],
-    left_out: Mapping[str, Comparison],
-    corrected: Mapping[str, np.ndarray],
-) -> tuple[RecordingFit, ...]:
+def _recordings(reached: Reached, conclusion: Conclusion, compared: Compared) -> tuple[RecordingFit, ...]:
     """The errors of each recording."""
     at, fitted, rows = conclusion.at, reached.problem.experiments, reached.problem.core.first_rows
     count = {e.name: rows[i + 1] - rows[i] for i, e in enumerate(fitted)}
     starts = {e.name: start_moved(e, at.problem.starts(at.u)[e.name]) for e in fitted if e.start == "estimated"}
-    return tuple(recording_fit(c, count, left_out, corrected, starts) for c in comparisons)
+    return tuple(recording_fit(c, count, compared.left_out, compared.corrected, starts) for c in compared.comparisons)
 
 
 def _contradicted(
     reached: Reached,
     conclusion: Conclusion,
-    comparisons: Sequence[Comparison],
+    compared: Compared,
     errors: Sequence[RecordingFit],
     interrupted: bool,
 ) -> dict[str, str]:
@@ -179,7 +183,7 @@ def _contradicted(
         Elsewhere(m.cost - best.cost, problem.parameters.to_physical(m.u), "another start") for m in reached.ends[1:]
     ]
     return (
-        held_out_motion(problem, comparisons, errors, interrupted)
+        held_out_motion(problem, compared.comparisons, errors, interrupted)
         | elsewhere(problem, conclusion.judged, best.cost, [*other_starts, *conclusion.lower])
         | conclusion.contradicted
     )

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays.timeseries import Array
-from ..experiment.experiment import Experiment
 from ..quantities.parameters import Parameters
 from ..statistics.spectral import autocorrelation
 from .growth import growths
@@ -23,6 +22,7 @@ from .parts import expanded_to
 from .problem import FitProblem
 from .progress import Latest, Observer
 from .smooth import Field
+from .sought import Sought
 from .windows import chosen, through
 
 SIZES, LENGTHS = (1e-3, 10.0), (0.1, 10.0)  # that are looked at; lengths of the shortest wave's and of the extent
@@ -35,32 +35,26 @@ LIKELY = 3.841  # of twice the logarithm of a likelihood: 95 % of a chi-square w
 POSSIBLE = 25.0  # likewise: what is less likely weighs less than 4e-6
 
 
-def settled(
-    experiments: Sequence[Experiment],
-    wanted: Parameters,
-    expanded: Parameters | None,
-    fields: Sequence[Field],
-    threads: int,
-    windows: Sequence[float] | str = (),
-    observe: Observer | None = None,
-) -> tuple[Parameters, Parameters | None, tuple[Field, ...], str]:
-    """The parameters with the priors that are most likely, also expanded where the search begins, the fields, and what
-    Ctrl-C left undone, if it came: then all is as it was at the point reached last.
+def with_likely_priors(
+    sought: Sought, threads: int, windows: Sequence[float] | str = (), observe: Observer | None = None
+) -> Sought:
+    """The same with the priors of its fields that are most likely, and where the search for them ended. If Ctrl-C came,
+    all is as it was at the point reached last.
 
     So many numbers explain a long motion nearly in a wrong minimum, too. So the first walk goes through windows.
 
     Args:
-        expanded: where the search begins so far; None = at the initial values.
         windows: s, or "auto", see `fit`.
     """
-    if not fields:
-        return wanted, expanded, (), ""
-    here, found = expanded_to(wanted, experiments) if expanded is None else expanded, tuple(fields)
+    if not sought.fields:
+        return sought
+    wanted, found = sought.wanted, sought.fields
+    here = expanded_to(wanted, sought.experiments) if sought.expanded is None else sought.expanded
     at, undone, picture = Latest(observe, here.initial()), "", None
     try:
         for k in range(ROUNDS):
             wanted, here = _carried(found, wanted), _carried(found, here)
-            problem = FitProblem(experiments, wanted, threads=threads, expanded=here)
+            problem = replace(sought, wanted=wanted, expanded=here).problem(threads)
             if k == 0:
                 auto = isinstance(windows, str)
                 lengths = chosen(problem, growths(problem, at.u)) if auto else [*map(float, windows)]
@@ -78,7 +72,8 @@ def settled(
             found = tuple(picture.bounded(found, i) for i in range(len(found)))
     except KeyboardInterrupt:
         undone = "sizes and lengths of smooth priors are those at which the search for them was stopped"
-    return _carried(found, wanted), _carried(found, here).starting_at(at.u), found, undone
+    begins = _carried(found, here).starting_at(at.u)
+    return replace(sought, wanted=_carried(found, wanted), expanded=begins, fields=found, undone=undone)
 
 
 def _carried(fields: Sequence[Field], parameters: Parameters) -> Parameters:
