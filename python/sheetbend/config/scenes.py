@@ -14,6 +14,7 @@ from ..mesh import TriangleMesh
 from ..objects.arm import add_arm, add_pendulum
 from ..objects.arm_data import Arm
 from ..objects.pivot import add_air_drag
+from ..objects.rod_shape import follow_length
 from ..objects.tool import Tool
 from ..scene.scene import Scene
 from . import scene_schema as schema
@@ -96,6 +97,9 @@ def build_scene(
     add_contacts(scene, section, particles.named, tools, folder)
     if section.pin:
         scene.pin([particles.find("scene.pin", r) for r in section.pin])
+    for _, rope in section.strands:
+        if rope.points == "recording" and rope.name in scene.ropes:
+            follow_length(scene, scene.ropes[rope.name])
     return scene, particles
 
 

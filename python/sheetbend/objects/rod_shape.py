@@ -10,9 +10,13 @@ from numpy.typing import ArrayLike
 
 from ..arrays.checks import finite
 from ..errors import SceneError
-from ..scene.scene import Array
+from ..quantities.quantities import Term
+from ..scene.scene import Array, Scene
 from .chain import resample
 from .grip import any_across, carried
+from .rope_grips import Chain
+
+SMOOTH = 0.1  # of a length: bends along less of it are those of noise, and stay
 
 
 def initial_shape(
@@ -70,18 +74,42 @@ def fitted_to_length(shape: Array, link: float, held: Sequence[int]) -> Array:
         lengths = np.linalg.norm(edges, axis=1)
         if np.abs(lengths - link).max() < 1e-12 * link:
             return x
-        J = np.zeros((len(edges), len(x), 3))
-        units = edges / lengths[:, None]
-        J[np.arange(len(edges)), np.arange(len(edges))] = -units
-        J[np.arange(len(edges)), np.arange(1, len(x))] = units
-        step = np.linalg.lstsq(J[:, free].reshape(len(edges), -1), link - lengths, rcond=1e-9)[0]
-        x[free] += step.reshape(-1, 3)
+        J = _of_lengths(x)[:, free].reshape(len(edges), -1)
+        x[free] += np.linalg.lstsq(J, link - lengths, rcond=1e-9)[0].reshape(-1, 3)
     reach, apart = link * (len(x) - 1), float(np.linalg.norm(shape[-1] - shape[0]))
     if apart < reach:
         fix = "give points of a bent shape between the held ends"
         raise SceneError("points", "cannot be bent to the length", reach, fix)
     fix = f"give EA or a length above {apart:.9g} m, or check the grips' places"
     raise SceneError("length", "does not reach between the held ends", reach, fix)
+
+
+def follow_length(scene: Scene, chain: Chain) -> None:
+    """Let a measured start follow the quantity `<name>_length`: where a fit changes the length, nodes that are not held
+    start on a chain so long near by, whose bends change smoothly, to first order.
+
+    Otherwise rigid links that are longer than the nodes are apart would throw them apart in the first substep, where a
+    rope that lies straight cannot choose how it buckles and forces do not balance."""
+    nodes, length = chain.particles, float(chain.arc_length[-1])
+    x, free = scene.nodes[nodes], np.flatnonzero(~np.isin(nodes, scene.held))
+    J = _of_lengths(x)[:, free].transpose(0, 2, 1)
+    bends = np.diff(np.eye(len(x)), n=2, axis=0)[:, free] * (SMOOTH * (len(x) - 1)) ** 2
+    way = np.tensordot(J, np.linalg.inv(np.eye(len(free)) + bends.T @ bends), 1)
+    met = np.tensordot(J, way, ((1, 2), (1, 2)))
+    pull = np.linalg.lstsq(met, np.full(len(met), 1.0 / len(met)), rcond=1e-9)[0]
+    rate = np.tensordot(pull, way, 1).T.ravel()
+    at = (3 * nodes[free, None] + np.arange(3)).ravel()
+    grown = Term("position", at, rate, ((f"{chain.name}_length", "identity"),))
+    scene.add_terms([grown, Term("position", at, -length * rate, ())])
+
+
+def _of_lengths(x: Array) -> Array:
+    """(links, nodes, 3), the derivative of the lengths of a chain's links."""
+    edges = np.diff(x, axis=0)
+    units, each = edges / np.linalg.norm(edges, axis=1, keepdims=True), np.arange(len(edges))
+    J = np.zeros((len(edges), len(x), 3))
+    J[each, each], J[each, each + 1] = -units, units
+    return J
 
 
 def initial_frames(name: str, chain: Array, first: ArrayLike | None, last: ArrayLike | None, turns: int) -> Array:
