@@ -18,8 +18,8 @@ MARGIN = 0.1  # of the motion's extent, by which that grid is larger
 def collider_lines(scene: Scene, times: Array, positions: Array) -> dict[str, Array]:
     """Lines (frames, lines, 2, 3) m of each collider by name, which draw it where it is at some times.
 
-    A plane is a square grid as wide as the motion, a sphere three circles, a capsule its circles and sides, a cylinder its
-    ends and sides, a box its edges, and a distance field sections of its mesh.
+    A plane is a square grid as wide as the motion, a sphere three circles, a capsule its circles and sides, a cylinder
+    its ends and sides, a box its edges, and a distance field sections of its mesh.
 
     Args:
         times: (frames,) s.
