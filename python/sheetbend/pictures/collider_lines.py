@@ -18,8 +18,8 @@ MARGIN = 0.1  # of the motion's extent, by which that grid is larger
 def collider_lines(scene: Scene, times: Array, positions: Array) -> dict[str, Array]:
     """Lines (frames, lines, 2, 3) m of each collider by name, which draw it where it is at some times.
 
-    A plane is a grid as wide as the motion, a sphere three circles, a capsule its circles and sides, a cylinder its
-    ends and sides, a box its edges, and a distance field sections of its mesh.
+    A plane is a square grid as wide as the motion, a sphere three circles, a capsule its circles and sides, a cylinder
+    its ends and sides, a box its edges, and a distance field sections of its mesh.
 
     Args:
         times: (frames,) s.
@@ -88,7 +88,8 @@ def _grid(positions: Array, origin: Array, turn: Array) -> Array:
     own = (positions - origin) @ turn
     seen = own[np.isfinite(own).all(axis=2)][:, :2]
     low, high = seen.min(axis=0), seen.max(axis=0)
-    low, high = low - MARGIN * (high - low).max(), high + MARGIN * (high - low).max()
+    middle, half = (low + high) / 2, (0.5 + MARGIN) * (high - low).max()
+    low, high = middle - half, middle + half
     x, y = np.linspace(low, high, CELLS + 1).T
     across = [[[a, low[1], 0.0], [a, high[1], 0.0]] for a in x]
     return np.array([*across, *([[low[0], b, 0.0], [high[0], b, 0.0]] for b in y)])

@@ -41,11 +41,14 @@ function shadeHeldOut(u, motion) {
 
 function frameLine(u, motion) {
   const { ctx, bbox } = u, x = u.valToPos(motion.times[page.frame], "x", true);
-  ctx.strokeStyle = color("gray");
+  ctx.save(); // the pen has the width and the dashes of the last curve
+  Object.assign(ctx, { strokeStyle: color("ink"), lineWidth: window.devicePixelRatio });
+  ctx.setLineDash([]);
   ctx.beginPath();
   ctx.moveTo(x, bbox.top);
   ctx.lineTo(x, bbox.top + bbox.height);
   ctx.stroke();
+  ctx.restore();
 }
 
 function redrawCurves() {
