@@ -149,6 +149,33 @@ def _new(
     markers: str | None,
     poses: Path | None,
 ) -> Outcome:
+    _check_measured(measured)
+    if files[0].suffix.lower() in garment.FILES:
+        _check_mesh(files, measured, markers, poses)
+        name = _name(files[0].stem)
+        target = _target(output, name)
+        with options(unit="--units"):
+            found = garment.draft_of_mesh(files[0], _seen_from(target, files[0]), name, measured, units, up)
+        return _written(console, target, name, found, "the mesh", f"sheetbend simulate {target} --mesh gltf")
+    with options(units="--units"):
+        recordings = [_read(file, units) for file in files]
+    if markers is not None:
+        recordings = [(_chosen(recording, markers), unit, words) for recording, unit, words in recordings]
+    name = _name(recordings[0][0].name)
+    target = _target(output, name)
+    if poses is not None:
+        if len(files) > 1:
+            raise ConfigError("--poses", "go with one recording", len(files), "make a configuration for each")
+        with options(poses="--poses"):
+            measured = replace(measured, poses=Poses.read(poses, _seen_from(target, poses)))
+    takes = [
+        Take(seen(recording, up), _seen_from(target, file), unit, words)
+        for file, (recording, unit, words) in zip(files, recordings, strict=True)
+    ]
+    return _written(console, target, name, _drafted(takes, name, measured), "the recording", f"sheetbend fit {target}")
+
+
+def _check_measured(measured: Measured) -> None:
     for option, given, fix in (
         ("--density", measured.density, "give kg/m of a rope, kg/m^2 of a cloth"),
         ("--length", measured.length, "give m"),
@@ -159,41 +186,32 @@ def _new(
     for option, given, fix in (("--weight", measured.weight, "give kg"), ("--margin", measured.margin, "give m")):
         if given is not None and not 0 <= given < float("inf"):
             raise ConfigError(option, "must be zero or more", given, fix)
-    if is_mesh := files[0].suffix.lower() in garment.FILES:
-        _check_mesh(files, measured, markers, poses)
-        name = _name(files[0].stem)
-    else:
-        with options(units="--units"):
-            recordings = [_read(file, units) for file in files]
-        if markers is not None:
-            recordings = [(_chosen(recording, markers), unit, words) for recording, unit, words in recordings]
-        name = _name(recordings[0][0].name)
+
+
+def _target(output: Path | None, name: str) -> Path:
+    """The configuration to write, which is not there yet."""
     target = output if output is not None else Path(f"{name}.toml")
     if target.suffix.lower() != ".toml":
         raise ConfigError("--output", "is no configuration", str(target), "give a file that ends in .toml")
     check_targets("--output", target.parent, [target])
     if target.exists():
         raise ConfigError("--output", "is there already", str(target), "name another file with --output")
-    named = [Path(os.path.relpath(file, target.parent)).as_posix() for file in files]
-    if is_mesh:
-        with options(unit="--units"):
-            found = garment.draft_of_mesh(files[0], named[0], name, measured, units, up)
-        return _written(console, target, name, found, "the mesh", f"sheetbend simulate {target} --mesh gltf")
-    if poses is not None:
-        if len(files) > 1:
-            raise ConfigError("--poses", "go with one recording", len(files), "make a configuration for each")
-        with options(poses="--poses"):
-            measured = replace(
-                measured, poses=Poses.read(poses, Path(os.path.relpath(poses, target.parent)).as_posix())
-            )
-    takes = [Take(seen(r, up), file, unit, words) for file, (r, unit, words) in zip(named, recordings, strict=True)]
+    return target
+
+
+def _seen_from(target: Path, file: Path) -> str:
+    """What the configuration calls a file: its path from there."""
+    return Path(os.path.relpath(file, target.parent)).as_posix()
+
+
+def _drafted(takes: list[Take], name: str, measured: Measured) -> Draft:
+    """The draft; errors about what was measured name the options that gave it."""
     try:
-        found = draft(takes, name, measured)
+        return draft(takes, name, measured)
     except RecordingError as error:
         if error.field in ("length", "poses", "weight", "margin", "at"):
             raise ConfigError(f"--{error.field}", error.problem, error.got, error.fix) from error
         raise
-    return _written(console, target, name, found, "the recording", f"sheetbend fit {target}")
 
 
 def _written(console: Console, target: Path, name: str, found: Draft, source: str, following: str) -> Outcome:
@@ -230,16 +248,15 @@ def _check_mesh(files: list[Path], measured: Measured, markers: str | None, pose
         raise ConfigError("--poses", "go with a recording, and the first file is a mesh", str(poses), "leave them out")
     if len(files) > 1:
         raise ConfigError("FILES", "are several, and the first is a mesh", [str(f) for f in files], "give one mesh")
-    if measured.length is not None:
-        raise ConfigError("--length", "is of a rope or a beam", measured.length, "leave it out")
-    if measured.weight is not None:
-        raise ConfigError("--weight", "is of a rope", measured.weight, "leave it out")
-    if measured.at is not None:
-        raise ConfigError("--at", "is of a beam", measured.at, "leave it out")
-    if measured.margin is not None:
-        raise ConfigError("--margin", "is of the markers on a cloth", measured.margin, "leave it out")
-    if markers is not None:
-        raise ConfigError("--markers", "are of a recording", markers, "leave them out")
+    for option, given, problem, fix in (
+        ("--length", measured.length, "is of a rope or a beam", "leave it out"),
+        ("--weight", measured.weight, "is of a rope", "leave it out"),
+        ("--at", measured.at, "is of a beam", "leave it out"),
+        ("--margin", measured.margin, "is of the markers on a cloth", "leave it out"),
+        ("--markers", markers, "are of a recording", "leave them out"),
+    ):
+        if given is not None:
+            raise ConfigError(option, problem, given, fix)
 
 
 def _built(console: Console, target: Path) -> dict[str, Any]:

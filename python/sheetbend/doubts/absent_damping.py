@@ -25,8 +25,7 @@ FRAMES = (1 / 3, 1.0, 3.0)  # intervals between frames: the time constants that 
 
 def undamped(scene: Scene) -> list[int]:
     """Places of the groups that have a stiffness and no damping."""
-    at, size = scene.compiled.layout["compliance"]
-    compliance = scene.compiled.inputs()[at : at + size]
+    compliance = scene.compiled.part(scene.compiled.inputs(), "compliance")
     return [
         k
         for k, places in enumerate(places_of_groups(scene.groups))
@@ -55,8 +54,7 @@ def _damped(e: Experiment, theta: Array, interval: float, frames: float, only: s
     """The experiment with Kelvin-Voigt damping in its undamped groups. The time constant is `frames` intervals [s]
     between frames; the force per rate is this time over the compliance."""
     every = list(places_of_groups(e.scene.groups))
-    at, _ = e.scene.compiled.layout["compliance"]
-    compliance = e.scene.compiled.inputs(theta)[at:]
+    compliance = e.scene.compiled.part(e.scene.compiled.inputs(theta), "compliance")
     scene, name = e.scene.shallow(), DAMPING.name
     scene.groups, scene.terms = list(scene.groups), list(scene.terms)
     scene.quantities = {**scene.quantities, name: Quantity(name, frames, "")}

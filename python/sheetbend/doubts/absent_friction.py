@@ -60,13 +60,13 @@ def dry_frictions(problem: FitProblem, u: Array, i: int, corrected: Array | None
         return
     values = problem.values_of(e, u)
     inputs = e.scene.compiled.inputs(e.scene.compiled.values(values))
-    (damping, _), (rest, _) = (e.scene.compiled.layout[name] for name in ("damping", "rest"))
+    damping, rest = (e.scene.compiled.part(inputs, name) for name in ("damping", "rest"))
     try:
         without = residuals(problem, u, i, e, corrected)
         turned = _turned(e, problem.recordings[i].times, values)
         for places in bare:
             g = places.group
-            numbers, viscosity, angle = inputs[rest + places.rest], inputs[damping + places.constraints], turned[g.name]
+            numbers, viscosity, angle = rest[places.rest], damping[places.constraints], turned[g.name]
             steps = np.abs(np.diff(angle, axis=0))
             if not (viscosity > 0.0).all() or not (steps.sum(axis=0) > 0.0).all():
                 continue

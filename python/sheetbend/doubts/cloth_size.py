@@ -129,19 +129,17 @@ def _alone(cloth: Cloth, material: Array, still: tuple[int, ...]) -> Scene:
 
 
 def _differences(scene: Scene, cloth: Cloth, ends: list[Scene], values: Mapping[str, float]) -> Iterator[Input]:
-    layout = ends[0].compiled.layout
     at: Array = np.array([values[name] for name in ends[0].quantities])
     low, high = (end.compiled.inputs(at) for end in ends)
     slope = (high - low) / (2.0 * STEP)
     for array in (*OF_CONSTRAINTS, *PARTICLES):
-        first, size = layout[array]
-        by = slope[first : first + size]
+        by = ends[0].compiled.part(slope, array)
         if not by.any():
             continue
         if array in PARTICLES:
             yield array, cloth.particles.astype(int), by[: len(cloth.particles)]
             continue
-        entries = np.zeros(size, dtype=int)
+        entries = np.zeros(len(by), dtype=int)
         for own in places_of_groups(ends[0].groups):
             entries[own.of(array)] = scene.places_of_group(own.group.name).of(array)
         yield array, entries, by

@@ -146,11 +146,11 @@ def _interpolated(place: Place, field: Array) -> Array:
 def _offsets(scene: Scene, places: Sequence[Place], r: Recording) -> tuple[Array, Array]:
     """(frames, markers, 3) m, how far markers are from where the scene starts, and (frames - 2, markers, 3) m/s, how
     much their velocities differ from those that it starts with; NaN where they are not seen."""
-    inputs, layout = scene.compiled.inputs(), scene.compiled.layout
+    compiled, inputs = scene.compiled, scene.compiled.inputs()
 
     def seen(array: str) -> Array:
-        first, count = layout[array]
-        return np.array([_interpolated(place, inputs[first : first + count].reshape(-1, 3)) for place in places])
+        field = compiled.part(inputs, array).reshape(-1, 3)
+        return np.array([_interpolated(place, field) for place in places])
 
     rates = (r.positions[2:] - r.positions[:-2]) / (r.times[2:] - r.times[:-2])[:, None, None]
     return np.asarray(r.positions - seen("position")), np.asarray(rates - seen("velocity"))

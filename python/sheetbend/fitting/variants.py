@@ -91,8 +91,7 @@ def _with_sensor(e: Experiment) -> Experiment:
     if len(times) == 0:
         return e
     compiled = e.scene.compiled
-    offset, size = compiled.layout["mass"]
-    weight = GRAVITY * float(np.sum(compiled.inputs()[offset : offset + size]))
+    weight = GRAVITY * float(np.sum(compiled.part(compiled.inputs(), "mass")))
     forces = ForceRecording(times, np.zeros((len(times), 3)), name="new sensor")
     try:
         return replace(e, forces=[ForceSensor(recording=forces, at=held, sigma=max(FORCE * weight, 1e-12))])

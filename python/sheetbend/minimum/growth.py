@@ -141,9 +141,8 @@ def growth(e: Experiment, end: float, values: Mapping[str, float] | None = None,
     compiled = e.scene.compiled
     inputs = compiled.inputs(compiled.values(values))
     if e.start == "equilibrium":
-        offset, size = compiled.layout["position"]
         try:
-            inputs[offset : offset + size] = equilibrium(e.scene, values=values).nodes.ravel()
+            compiled.part(inputs, "position")[:] = equilibrium(e.scene, values=values).nodes.ravel()
         except NoEquilibriumError:
             return Growth(e.name, times, sigma)
     x, moved = _rollout(e.scene, e.solver, inputs, steps, t0)

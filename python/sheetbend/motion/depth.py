@@ -34,13 +34,12 @@ def deepest(
         modes: by contact (frames, particles), see `ContactMode`.
     """
     at = inputs.copy()
-    first, size = scene.layout["position"]
-    found = {}
+    positions, found = scene.part(at, "position"), {}
     for k, (name, mode) in enumerate(modes.items()):
         touched = mode != ContactMode.APART
         found[name] = 0.0
         for frame in np.flatnonzero(touched.any(axis=1)):
-            at[first : first + size] = states[frame]
+            positions[:] = states[frame]
             gaps = scene.core.contact_gaps(at, float(times[frame]), k)[:, 0]
             found[name] = max(found[name], -float(gaps[touched[frame]].min()))
     return found
@@ -54,8 +53,7 @@ def too_deep(scene: Scene, values: Mapping[str, float] | None, depths: Mapping[s
         depths: m, by contact, see `ContactCounts.deepest`.
     """
     compiled = scene.compiled
-    first, _ = compiled.layout["contact_radius"]
-    radii = compiled.inputs(compiled.values(values))[first:]
+    radii = compiled.part(compiled.inputs(compiled.values(values)), "contact_radius")
     found = []
     for contact, radius in zip(scene.contacts.contacts, radii, strict=False):  # radii of pieces follow
         bound, depth = max(SHARE * float(radius), UNSEEN), depths.get(contact.name)

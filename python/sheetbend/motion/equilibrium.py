@@ -197,8 +197,7 @@ def equilibrium(
 
 def whole_start(scene: Scene, start: ArrayLike, inputs: np.ndarray, field: str = "start") -> np.ndarray:
     """(3 nodes,) m, positions where hidden nodes that they leave out are where the inputs have them."""
-    offset, size = scene.compiled.layout["position"]
-    x, own = inputs[offset : offset + size].copy(), start_of(scene, start, SceneError, field)
+    x, own = scene.compiled.part(inputs, "position").copy(), start_of(scene, start, SceneError, field)
     x[: own.size] = own.ravel()
     return x
 

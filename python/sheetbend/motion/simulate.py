@@ -84,9 +84,8 @@ def simulate(
     steps = substeps(times, solver.h)
     inputs = compiled.inputs(compiled.values(values))
     if start is not None:
-        offset, _ = compiled.layout["position"]
         own = start_of(scene, start, InputError)
-        inputs[offset : offset + own.size] = own.ravel()
+        compiled.part(inputs, "position")[: own.size] = own.ravel()
     frames = len(steps)
     numbers = 2 * compiled.core.dofs + compiled.core.rows + len(scene.volumes.triangles)
     expect_room("times", 8 * frames * numbers, f"ask for fewer than {frames} frames at a time")

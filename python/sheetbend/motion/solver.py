@@ -171,10 +171,8 @@ class Solver:
         except ValueError as error:
             raise refusal(error, InputError, self.method) from error
         inputs = scene.inputs()
-        offset, size = scene.layout["compliance"]
-        if self.method == "direct" or (
-            self.method != "gauss_seidel" and not (inputs[offset : offset + size] > 0).all()
-        ):
+        elastic = (scene.part(inputs, "compliance") > 0).all()
+        if self.method == "direct" or (self.method != "gauss_seidel" and not elastic):
             warn_redundant(scene.name, core.redundant(inputs, 0.0))
         return core
 

@@ -76,11 +76,10 @@ def elastic_energy_gradient(rest: Equilibrium) -> dict[str, float]:
     """Differentiate the elastic energy of all groups at rest, alpha lambda.lambda/2, with respect to every named
     quantity, in J per unit of the quantity. The energy -p V of a pressure is left out."""
     scene, compiled = rest.scene, rest.scene.compiled
-    offset, size = compiled.layout["compliance"]
     own = {group.name: alpha for group, alpha in _compliances(scene, compiled.inputs(rest.theta))}
     bar = rest.input_gradient(None, {name: own[name][:, None] * rest.forces[name] for name in own})
     explicit = [(rest.forces[name] ** 2).sum(axis=1) / 2.0 for name in own]
-    bar[offset : offset + size] += np.concatenate(explicit)
+    compiled.part(bar, "compliance")[:] += np.concatenate(explicit)
     return rest.by_name(bar)
 
 
@@ -108,10 +107,9 @@ def support_forces(rest: Equilibrium) -> Array:
 
 def _pressure_forces(scene: Scene, inputs: Array, positions: Array) -> Array:
     """(nodes, 3) N, pressure times area of each triangle in air, a third to every corner."""
-    offset, size = scene.compiled.layout["pressure"]
     triangles = np.reshape(scene.air.triangles, (-1, 3)).astype(int)
     first, second, third = np.moveaxis(positions[triangles], 1, 0)
-    each = inputs[offset : offset + size, None] * np.cross(second - first, third - first) / 6.0
+    each = scene.compiled.part(inputs, "pressure")[:, None] * np.cross(second - first, third - first) / 6.0
     forces = np.zeros_like(positions)
     for corner in triangles.T:
         np.add.at(forces, corner, each)
@@ -120,6 +118,5 @@ def _pressure_forces(scene: Scene, inputs: Array, positions: Array) -> Array:
 
 def _compliances(scene: Scene, inputs: Array) -> Iterator[tuple[Group, Array]]:
     """Every group with the compliances of its constraints."""
-    offset, size = scene.compiled.layout["compliance"]
-    compliance = inputs[offset : offset + size]
+    compliance = scene.compiled.part(inputs, "compliance")
     yield from ((places.group, compliance[places.constraints]) for places in places_of_groups(scene.groups))

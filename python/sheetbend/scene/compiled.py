@@ -116,34 +116,33 @@ class CompiledScene:
         if self.contacts:
             self._settle(scene)
             self._expect_apart(scene)
-            first, _ = self.layout["contact_radius"]
-            self.fastest = fastest(scene.contacts, self.inputs()[first : first + len(self.contacts)])
+            radii = self.part(self.inputs(), "contact_radius")
+            self.fastest = fastest(scene.contacts, radii[: len(self.contacts)])
         if scene.contacts.pieces:
             pieces.expect_apart(self.core, self.inputs(), scene.node_in_words)
         if scene.contacts.balls is not None:
             self._expect_balls_apart(scene, scene.contacts.balls)
 
     def _settle(self, scene: SceneData) -> None:
-        first, size = self.layout["position"]
         if scene.contacts.settling:
             inputs = _core.ParameterMap(self.map()).inputs(self.theta)
-            moved, self.settled = settled(scene, self.core, inputs, first)
-            self._base[first : first + size] += moved.ravel()
+            moved, self.settled = settled(scene, self.core, inputs, self.layout["position"][0])
+            self.part(self._base, "position")[:] += moved.ravel()
 
     def _expect_apart(self, scene: SceneData) -> None:
         inputs = self.inputs()
-        offset, size = self.layout["mass"]
-        scene.contacts.expect_apart(self.core, inputs, inputs[offset : offset + size], scene.gravity, set(scene.held))
+        scene.contacts.expect_apart(self.core, inputs, self.part(inputs, "mass"), scene.gravity, set(scene.held))
 
     def _expect_balls_apart(self, scene: SceneData, balls: Balls) -> None:
         inputs = self.inputs()
-        places, radii = (self._part(inputs, array) for array in ("position", "contact_radius"))
+        places, radii = (self.part(inputs, array) for array in ("position", "contact_radius"))
         own = radii[len(radii) - len(balls.particles) :]
         balls.expect_apart(places.reshape(-1, 3)[balls.particles], own, scene.node_in_words)
 
-    def _part(self, inputs: np.ndarray, array: str) -> np.ndarray:
+    def part(self, flat: np.ndarray, array: str) -> np.ndarray:
+        """A view of one input array, over all nodes, in a flat vector of inputs or of their derivatives."""
         offset, size = self.layout[array]
-        return inputs[offset : offset + size]
+        return flat[offset : offset + size]
 
     @cached_property
     def map_of_quantities(self) -> _core.ParameterMap:
@@ -155,8 +154,7 @@ class CompiledScene:
         arrays = scene.base_arrays()
         self._shapes = {name: np.shape(values) for name, values in arrays.items()}
         for array, values in arrays.items():
-            offset, size = self.layout[array]
-            base[offset : offset + size] = np.ravel(values)
+            self.part(base, array)[:] = np.ravel(values)
         return base
 
     def map(self, extra: int = 0, terms: Sequence[Term] = (), names: Sequence[str] | None = None) -> dict[str, Any]:
