@@ -56,13 +56,6 @@ std::vector<std::vector<int>> joined_particles(const Scene& scene, const DirectB
   return joined;
 }
 
-// Adds the 3 x 3 entries of two particles with these first dofs, of the lower triangle.
-void add_entries(int row, int column, Entries& entries) {
-  for (int a = 0; a < 3; ++a)
-    for (int b = 0; b < 3; ++b)
-      if (column + b <= row + a) entries.emplace_back(row + a, column + b);
-}
-
 // The entries of the lower triangle that constraints and contacts fill.
 Entries filled_entries(const DirectBlock& block, const CondensedPattern& c) {
   Entries entries;
@@ -79,6 +72,12 @@ Entries filled_entries(const DirectBlock& block, const CondensedPattern& c) {
 }
 
 }  // namespace
+
+void add_entries(int row, int column, Entries& entries) {
+  for (int a = 0; a < 3; ++a)
+    for (int b = 0; b < 3; ++b)
+      if (column + b <= row + a) entries.emplace_back(row + a, column + b);
+}
 
 int gradient_row(const DirectBlock& block, int particle, int row) {
   const auto begin = block.window_rows.begin() + block.window[particle];

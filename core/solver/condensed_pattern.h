@@ -2,10 +2,15 @@
 #pragma once
 
 #include <map>
+#include <utility>
+#include <vector>
 
 #include "core/solver/plan.h"
 
 namespace sheetbend {
+
+// Adds the 3 x 3 entries of two particles with these first dofs that are in the lower triangle.
+void add_entries(int row, int column, std::vector<std::pair<int, int>>& entries);
 
 // Where `row` stands among the gradient rows of a particle of the block.
 int gradient_row(const DirectBlock& block, int particle, int row);

@@ -1,14 +1,14 @@
-// Which rigid rows of a condensed block follow from its other rigid rows: those that J W J^T has no pivot for. The factor of other blocks finds them as it
-// goes; a condensed block's stands over particles, and knows no such rows.
-// A row that is said by rows before it in the block is left out, so that small changes of a scene leave out the same one.
-// Dense: as the border of the condensed solve, for few rigid rows.
+// Which rigid rows of a condensed block (core/linear/condensed.h) follow from its other rigid rows. An LDL^T factor of J W J^T has no pivot for such a row;
+// blocks that are factored by rows notice that as they go, but a condensed block is factored by particles, so its rigid rows are looked at here.
+// Of rows that say the same the last one in the block is left out, so that a small change of the scene does not leave out another one.
+// The matrix is dense, as the border of the condensed solve is: rigid rows are few.
 #pragma once
 
 #include <cmath>
 #include <vector>
 
 #include "core/linear/block_numbers.h"
-#include "core/solver/first_order.h"
+#include "core/solver/scenes.h"
 
 namespace sheetbend {
 
@@ -31,12 +31,7 @@ class IndependentRows {
   // J W J^T over the rigid rows of a scene.
   template <class T>
   void fill(const BlockNumbers<T>& block, int scene) {
-    const auto number = [scene](const T& a) {
-      if constexpr (std::is_same_v<T, Pack>)
-        return a[scene];
-      else
-        return static_cast<double>(value_of(a));
-    };
+    const auto number = [scene](const T& a) { return number_of(a, scene); };
     place_.assign(block.size, -1);
     rigid_.clear();
     for (int row = 0; row < block.size; ++row)

@@ -83,14 +83,10 @@ class JoinedBall {
  private:
   static Vec3<S> unit(int d) { return {S(d == 0 ? 1.0 : 0.0), S(d == 1 ? 1.0 : 0.0), S(d == 2 ? 1.0 : 0.0)}; }
 
-  // Calls f(row, gradient) for the rows of these constraints, with their gradients at the node that uses them.
+  // Calls f(row, gradient) for these rows, with their gradients at the node that uses them.
   template <class F>
-  void for_each_row(const std::vector<Assembly::Use>& uses, F&& f) const {
-    for (const auto& [member, place] : uses) {
-      const Member& m = assembly_.members[member];
-      const Group& group = source_.scene.groups[m.group];
-      for (int j = 0; j < group.rows; ++j) f(m.first_row + j, Vec3<S>(&J_[member][3 * (j * group.arity + place)]));
-    }
+  void for_each_row(const std::vector<RowUse>& uses, F&& f) const {
+    for (const auto& [row, place] : uses) f(row, Vec3<S>(&J_[row][3 * place]));
   }
 
   void load_gradients() {
@@ -99,7 +95,10 @@ class JoinedBall {
     for (const Member& m : assembly_.members) {
       read(m, element.x, p);
       element.evaluate(source_.scene.groups[m.group].kind, p);
-      J_.emplace_back(element.J, element.J + element.kind->rows * element.kind->dofs);
+      for (int j = 0; j < element.kind->rows; ++j) {
+        const S* row = element.J + j * element.kind->dofs;
+        J_.emplace_back(row, row + element.kind->dofs);
+      }
     }
   }
 
@@ -127,7 +126,7 @@ class JoinedBall {
   const ContactSource<T>& source_;
   const Assembly& assembly_;
   int ball_;
-  std::vector<std::vector<S>> J_;    // per constraint
+  std::vector<std::vector<S>> J_;    // per row
   std::array<std::vector<S>, 3> y_;  // per row
   std::vector<Matrix3<S>> U_;        // of each that is joined
 };

@@ -8,40 +8,13 @@
 #include "core/solver/block_frames.h"
 #include "core/solver/body_loops.h"
 #include "core/solver/condensed_pattern.h"
-#include "core/solver/ordering.h"
+#include "core/solver/elimination.h"
 #include "core/solver/paired_pattern.h"
 
 namespace sheetbend {
 namespace {
 
 using sheetbend_blocks::lanes;
-
-// A movable node and the rows that it takes part in, ascending.
-using Users = std::vector<std::pair<int, std::vector<int>>>;
-
-// Numbers the rows of members and volumes and lists those of every movable node; nodes in the order in which elimination meets them.
-Users number_rows(const Scene& scene, std::vector<Member>& members, std::vector<BlockVolume>& volumes) {
-  Users users;
-  std::map<int, int> place;
-  int rows = 0;
-  for (Member& m : members) {
-    const Group& group = scene.groups[m.group];
-    m.first_row = rows;
-    rows += group.rows;
-    for (const int node : group.nodes(m.item))
-      if (scene.role[node] == Role::free) {
-        const auto [at, is_new] = place.emplace(node, static_cast<int>(users.size()));
-        if (is_new) users.push_back({node, {}});
-        for (int row = m.first_row; row < rows; ++row) users[at->second].second.push_back(row);
-      }
-  }
-  for (BlockVolume& v : volumes) {
-    v.row = rows++;
-    for (const int node : scene.volumes[v.volume].nodes)
-      if (scene.role[node] == Role::free) users[place.at(node)].second.push_back(v.row);
-  }
-  return users;
-}
 
 // The volumes around the members' nodes; connected_chains() has left none of their nodes to other members.
 std::vector<BlockVolume> volumes_around(const Scene& scene, const std::vector<Member>& members) {
@@ -55,19 +28,6 @@ std::vector<BlockVolume> volumes_around(const Scene& scene, const std::vector<Me
     if (std::ranges::any_of(scene.volumes[v].nodes, [&](int node) { return nodes.contains(node); }))
       volumes.push_back({v, 0, {}, {}});
   return volumes;
-}
-
-// Every pair of rows that share a movable node.
-FactorStructure structure_of(const Scene& scene, const std::vector<Member>& members,
-                             const std::vector<BlockVolume>& volumes, const Users& users, double loop_pivot) {
-  std::vector<std::pair<int, int>> entries;
-  for (const auto& [node, rows] : users)
-    for (const int row : rows)
-      for (const int column : rows)
-        if (column <= row) entries.emplace_back(row, column);
-  const int rows = members.back().first_row + scene.groups[members.back().group].rows;
-  return {rows + static_cast<int>(volumes.size()), entries, volumes.empty() && loop_pivot == 0.0,
-          std::max(loop_pivot, redundant_pivot)};
 }
 
 // A particle of the block, with the rows that it takes part in. Windows of a band have no gaps: rows between that do not touch the particle
@@ -184,23 +144,18 @@ DirectBlock make_block(const Scene& scene, std::vector<Member> members, const So
   const double loop_pivot = !implicit && closes_loop(scene, members) ? pivot_of_loop : 0.0;
   if (condensed && loop_pivot > 0.0) order_bodies_first(scene, members);
   std::vector<BlockVolume> volumes = volumes_around(scene, members);
-  Users users = number_rows(scene, members, volumes);
-  for (const int node : loose) users.push_back({node, {}});
-  FactorStructure structure =
-      condensed ? FactorStructure(0, {}) : structure_of(scene, members, volumes, users, loop_pivot);
-  if (!condensed && !structure.banded()) {
-    order_for_low_fill(scene, members);
-    if (loop_pivot > 0.0) order_bodies_first(scene, members);
-    users = number_rows(scene, members, volumes);
-    structure = structure_of(scene, members, volumes, users, loop_pivot);
-  }
-  DirectBlock block{std::move(members), {}, {}, {0}, {}, {}, {}, 0, false, false, std::move(structure)};
+  Elimination elimination = condensed ? Elimination{number_rows(scene, members, volumes), FactorStructure(0, {})}
+                                      : order_rows(scene, members, loop_pivot, volumes);
+  for (const int node : loose) elimination.rows.push_back({node, {}});
+  DirectBlock block{std::move(members), {}, {}, {0}, {}, {}, {}, 0, false, false, std::move(elimination.structure)};
   block.volumes = std::move(volumes);
   block.implicit = implicit;
   block.loop_pivot = loop_pivot;
   if (condensed) block.condensation.emplace();  // to be filled in: it has no band
   std::map<int, int> particle_of;
-  for (const auto& [node, rows] : users) {
+  for (const auto& [node, uses] : elimination.rows) {
+    std::vector<int> rows;
+    for (const RowUse& use : uses) rows.push_back(use.row);
     particle_of[node] = add_particle(block, node, rows);
     if (!condensed && !block.banded())
       for (const int row : rows)

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/linear/low_fill.h"
+#include "core/solver/condensed_pattern.h"
 
 namespace sheetbend {
 namespace {
@@ -49,17 +50,15 @@ PairedPattern pattern_with(const Scene& scene, const DirectBlock& block, const s
   PairedPattern all;
   CondensedPattern& c = all.pattern;
   for (const int place : places_for_low_fill(block.movable, joined)) c.dof_of.push_back(3 * place);
-  std::vector<std::pair<int, int>> places;  // (row, column) of blocks of three
+  std::vector<std::pair<int, int>> places;  // first dofs of two particles, (row, column)
   for (const auto& own : joined)
     for (const int p : own)
       for (const int q : own)
-        if (c.dof_of[q] <= c.dof_of[p]) places.emplace_back(c.dof_of[p] / 3, c.dof_of[q] / 3);
+        if (c.dof_of[q] <= c.dof_of[p]) places.emplace_back(c.dof_of[p], c.dof_of[q]);
   std::sort(places.begin(), places.end());
   places.erase(std::unique(places.begin(), places.end()), places.end());
   std::vector<std::pair<int, int>> entries;
-  for (const auto& [row, column] : places)
-    for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < (row == column ? a + 1 : 3); ++b) entries.emplace_back(3 * row + a, 3 * column + b);
+  for (const auto& [row, column] : places) add_entries(row, column, entries);
   c.structure = FactorStructure(3 * block.movable, entries, false);
   for (const MemberRun& run : block.runs) all.entries.push_back(entries_of(scene, block, run, c));
   return all;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "core/blocks/kernels.h"
@@ -19,6 +20,14 @@ struct Member {
   int group, item;
   int first_row;  // in the block's matrix
 };
+
+// A row of constraints, and which of its constraint's nodes a node is.
+struct RowUse {
+  int row, place;
+};
+
+// Nodes that can move, each with the rows that it takes part in, ascending; in the order in which elimination meets them.
+using RowsOfNodes = std::vector<std::pair<int, std::vector<RowUse>>>;
 
 // A block's members of one group, in elimination order; lanes past the end repeat the last one.
 struct MemberRun {
@@ -94,14 +103,11 @@ struct SweptGroup {
   bool packed() const { return !nodes.empty(); }
 };
 
-// Constraints that join balls to other particles, with the rows of their matrix (joined_balls.h).
+// Constraints that join balls to other particles (joined_balls.h).
 struct Assembly {
-  struct Use {
-    int member, place;  // a constraint, and which of its nodes it is
-  };
-  std::vector<Member> members;                           // in elimination order
-  FactorStructure structure;                             // of J M^-1 J^T + a
-  std::vector<std::pair<int, std::vector<Use>>> joined;  // nodes that can move, ascending, with what uses them
+  std::vector<Member> members;  // in elimination order
+  FactorStructure structure;    // of J M^-1 J^T + a
+  RowsOfNodes joined;           // by node
 };
 
 struct Plan {

@@ -5,6 +5,7 @@
 #include "core/element/any_kind_hessian.h"
 #include "core/linear/low_fill.h"
 #include "core/scalar/pivot.h"
+#include "core/solver/elimination.h"
 
 namespace sheetbend {
 namespace {
@@ -96,10 +97,7 @@ void RigidRows::place_rows(const DirectBlock& block) {
     }
     J_.assign(J, 0.0);
     std::vector<std::pair<int, int>> entries;
-    for (const auto& uses : uses_)
-      for (const Use& i : uses)
-        for (const Use& k : uses)
-          if (k.row <= i.row) entries.emplace_back(i.row, k.row);
+    for (const auto& uses : uses_) add_entries_of_particle(uses, entries);
     structure_ = FactorStructure(static_cast<int>(rows_.size()), entries, true, redundant_pivot);
   };
   for (std::size_t m = 0; m < count; ++m) order[m] = static_cast<int>(m);
