@@ -64,6 +64,12 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         "masses: the motion shows only their ratios. One of them is set to 1 kg (or 1 kg m^2), and the others are "
         "relative to it"
     ]
+    if len(arms) == 1:
+        unknown.append(
+            "how its hinge loses energy: dry friction and the drag of air are fitted, and a viscous hinge looks like a "
+            "mixture of both. Then arm_friction is too large: in an example 0.020 for 0.007 N m, without a warning. "
+            "Compare a fit with `viscosity` in [[scene.pendulum]] and [parameters.arm_hinge_viscosity]"
+        )
     if len(arms) > 1:
         unknown.append("how the arms that hang share a mass at their hinges: it moves like a part of either one")
     apart = max(_drift(s, a, b) for a, b in pairwise(joints))
