@@ -74,6 +74,29 @@ def test_poses_of_ros_are_read_as_places(tmp_path: Path) -> None:
     assert np.array_equal(got.positions, X) and np.allclose(got.times, TIMES, rtol=0, atol=1e-12)
 
 
+def test_columns_beside_coordinates_are_not_read(tmp_path: Path) -> None:
+    """A rotation of a tool and errors of cameras were refused as a marker without an x."""
+    header = "time,a_x,a_y,a_z,a_qx,a_qy,a_qz,a_qw,b_x,b_y,b_z,b_error,fnum"
+    lines = [[t, *a, 0.0, 0.0, 0.0, 1.0, *b, 0.4, k] for k, (t, (a, b)) in enumerate(zip(TIMES, X, strict=True))]
+    (tmp_path / "take.csv").write_text(table(header, lines))
+    found = Recording.load(tmp_path / "take.csv")
+    assert found.markers == ("a", "b") and found.metadata["columns_not_read"][-2:] == ["b_error", "fnum"]
+    np.testing.assert_array_equal(found.positions, X)
+    (tmp_path / "take.csv").write_text(table("time,a_x,a_y,a_height,b_x,b_y,b_z", rows()))
+    with pytest.raises(RecordingError, match="must have the column 'a_z' there"):
+        Recording.load(tmp_path / "take.csv")
+
+
+@pytest.mark.parametrize("header", ["timestamp,marker_id,x,y,z", "Time_Stamp [s],ID,pos_x [m],pos_y [m],pos_z [m]"])
+def test_a_row_for_each_marker_under_other_names(tmp_path: Path, header: str) -> None:
+    """These were refused, with the advice to name columns that a table of one row per marker does not have."""
+    lines = [[t, k, *place] for t, frame in zip(TIMES, X, strict=True) for k, place in enumerate(frame)]
+    (tmp_path / "take.csv").write_text(table(header, lines))
+    found = Recording.load(tmp_path / "take.csv")
+    np.testing.assert_array_equal(found.positions, X)
+    np.testing.assert_allclose(found.times, TIMES)
+
+
 def test_poses_of_a_body_are_refused_with_where_they_go(tmp_path: Path) -> None:
     (tmp_path / "take.csv").write_text("time,x,y,z,qx,qy,qz,qw\n0,1,2,3,0,0,0,1\n")
     with pytest.raises(RecordingError, match=r"poses of a body.*--poses"):
@@ -208,7 +231,12 @@ def test_zeros_of_a_trc_file_are_lost_markers(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [("take.mat", "loadmat"), ("take.bag", "export the poses as CSV"), ("a.toml", "is a configuration")],
+    [
+        ("take.mat", "loadmat"),
+        ("take.bag", "export the poses as CSV"),
+        ("a.toml", "is a configuration"),
+        ("a.json", "json.load"),
+    ],
 )
 def test_files_that_are_not_read_say_how_to_convert_them(tmp_path: Path, name: str, words: str) -> None:
     (tmp_path / name).write_bytes(b"x")

@@ -697,3 +697,19 @@ def test_a_rope_between_two_rigid_bodies(tmp_path: Path) -> None:
     ]
     assert list(held["markers"]) == [f"m{k}" for k in range(3, 12)]
     assert sum("move as one rigid body, which holds the rope" in sentence for sentence in found.seen) == 2
+
+
+@pytest.mark.parametrize("droops", [0.2, 0.5])
+def test_a_flag_that_two_points_of_a_pole_hold(droops: float) -> None:
+    """One was taken to hold the whole right edge, the other one a corner of the top edge, or all of it."""
+    t = np.arange(201)[:, None] / RATE
+    flat = np.concatenate([grid(5, 3, 0.1, 0.15) + np.array([0.1, 0.3]), [[0.0, 0.0], [0.0, 0.3]]])
+    along, up = flat[:, 0], flat[:, 1]
+    wave = 0.25 * along * np.sin(9.0 * t - 12.0 * along + 2.0 * up)
+    x = np.stack([0.97 * along + 0.0 * wave, wave, 1.0 + up - droops * along + 0.03 * wave], axis=2)
+    x = x + np.random.default_rng(7).normal(0.0, NOISE, x.shape)
+    names = (*(f"f{k}" for k in range(15)), "pole_low", "pole_top")
+    found = draft([Take(seen(sb.Recording(x, t[:, 0], names)), "take.csv")], "take")
+    (cloth,) = tomllib.loads(found.text)["scene"]["cloth"]
+    assert cloth["pinned"] == ["right"] and "set" not in cloth
+    assert "on what holds the whole right edge and stays in place: pole_low, pole_top" in found.seen

@@ -22,6 +22,7 @@ HANGS = 0.4  # of its length: a cloth of which one end is so much higher than th
 AROUND = 6  # markers next to a holder show how the cloth lies there
 REACHES = 2.5  # spacings from the nearest marker on the cloth: how near a holder's marker is
 LOOSE = 0.15  # of this distance: by so much it varies at most, a standard deviation
+CORNER = 0.5  # of how far a holder's marker is beyond any side: so far it is beyond the one side that several hold
 SIDES = {"left": (0, -1), "right": (0, 1), "bottom": (1, -1), "top": (1, 1)}
 
 
@@ -134,11 +135,10 @@ def holds(
     apart = spacing(s.apart[np.ix_(numbers, numbers)])
     moved = max(motion(x[:, numbers]), apart)
     by_side: dict[str, list[tuple[float, float, int]]] = {}
-    for k in others:
-        at = _place(s, numbers, flat, k, apart)
-        if at is None:
-            continue
-        side, beyond = _side(flat, at, sides)
+    places = {k: at for k in others if (at := _place(s, numbers, flat, k, apart)) is not None}
+    sides_of = _one_side(flat, list(places.values())) or sides
+    for k, at in places.items():
+        side, beyond = _side(flat, at, sides_of)
         if beyond > -0.5 * apart:
             by_side.setdefault(side, []).append((float(at[1 - SIDES[side][0]]), beyond, k))
     if len(sides) > 1 and all(len(near) == 1 for near in by_side.values()):
@@ -260,10 +260,23 @@ def _place(s: Seen, own: list[int], flat: Array, k: int, apart: float) -> Array 
 
 def _side(flat: Array, at: Array, sides: Sequence[str]) -> tuple[str, float]:
     """The side of the markers' box that a place is beyond, and by how much, m; negative inside of it."""
-    low, high = flat.min(axis=0), flat.max(axis=0)
-    off = {side: float(at[a] - high[a] if sign > 0 else low[a] - at[a]) for side, (a, sign) in SIDES.items()}
+    off = _off(flat, at)
     side = max([side for side in sides if off[side] > 0] or off, key=lambda side: off[side])
     return side, off[side]
+
+
+def _one_side(flat: Array, places: Sequence[Array]) -> tuple[str, ...]:
+    """The side that all of several places are beyond, about as far as beyond any other: two at the corners of a flag's
+    pole hold one side of it, not two."""
+    off = [_off(flat, at) for at in places]
+    every = [side for side in SIDES if all(here[side] > CORNER * max(here.values()) > 0.0 for here in off)]
+    return (max(every, key=lambda side: min(here[side] for here in off)),) if len(places) > 1 and every else ()
+
+
+def _off(flat: Array, at: Array) -> dict[str, float]:
+    """m, by which a place is beyond each side of the markers' box; negative inside of it."""
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    return {side: float(at[a] - high[a] if sign > 0 else low[a] - at[a]) for side, (a, sign) in SIDES.items()}
 
 
 def _sags(x: Array, row: list[int]) -> bool:

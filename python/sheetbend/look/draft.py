@@ -66,11 +66,13 @@ def draft(takes: Sequence[Take], name: str, measured: Measured | None = None) ->
             raise RecordingError(first.recording.name, "holds too few frames to tell what moves", frames, fix)
         got = joined(first.recording.markers)
         if len(first.recording.markers) < FEWEST:
-            fix = "record three or more on a rope, and more on a cloth"
-            raise RecordingError(
-                "markers", "are too few to tell what moves, unless it is a pendulum or a beam that swings", got, fix
+            fix = (
+                "of a pendulum, give its pivot too, as a marker that stays; record three or more on a rope, and more "
+                "on a cloth"
             )
-        fix = "write a configuration by hand, see docs/configuration.md"
+            problem = "are too few to tell what moves, unless it is a pendulum in a plane or a beam that swings"
+            raise RecordingError("markers", problem, got, fix)
+        fix = "write a configuration by hand, see docs/configuration.md, and docs/bodies.md for rigid bodies"
         raise RecordingError(
             "markers", "do not move like a rope, beam, cloth, pendulum or a body in free flight", got, fix
         )
@@ -141,6 +143,9 @@ def _told(takes: Sequence[Take], up: str | None) -> list[str]:
     if isinstance(pieces, dict) and pieces:
         each = ", ".join(f"{name} goes on as {joined(more)}" for name, more in pieces.items())
         said.append(f"markers without a label that were lost and found again are joined: {each}")
+    unread = first.recording.metadata.get("columns_not_read")
+    if isinstance(unread, list) and unread:
+        said.append(f"columns that hold no coordinate of a marker are not read: {joined(map(str, unread))}")
     said += first.strangers
     x = first.recording.positions
     box = np.nanmax(x, axis=(0, 1)) - np.nanmin(x, axis=(0, 1))

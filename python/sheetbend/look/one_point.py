@@ -124,7 +124,10 @@ def _start(s: Seen, swing: Array) -> tuple[float, bool]:
 def _given(measured: Measured) -> tuple[float, float]:
     """m, of the beam and from its clamp to the marker."""
     if measured.length is None:
-        fix = "give the free length of the beam, from the clamp to its end in m, and with --at where the marker is"
+        fix = (
+            "give the free length of the beam, from the clamp to its end in m, and with --at where the marker is. If "
+            "it is the bob of a pendulum, give its pivot too, as a marker that stays"
+        )
         raise RecordingError("length", "is needed of a beam that one marker shows", None, fix)
     if measured.at is None:
         fix = "give how far the marker or the laser's spot is from the clamp along the beam, in m"

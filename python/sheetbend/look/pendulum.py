@@ -16,7 +16,7 @@ from ..statistics.white_noise import white_variance
 from .seen import RIGID, Seen
 from .swing import Moments, Swing, moments
 from .take import Description, Measured, Take
-from .text import table
+from .text import joined, table
 
 Array = np.ndarray
 Piece = tuple[dict[str, Any], float]
@@ -27,6 +27,8 @@ ASKEW = 2e-3  # of an arm, by which its length changes beyond noise, from which 
 STRETCHED = 2e-3  # by how much a picture is wider than it is high, from which on it is told
 FLAT, STRAIGHT = 0.02, 0.01  # of an arm: how far it may leave its plane, and how much its length may change
 BENDS = 0.6  # of l theta^2/24, by which a line gets shorter where it turns, from which on it is a rope: those 1 to 2
+TURNED = 2.5  # times the noise, the standard deviation of a marker seen from an arm that it is on: 2 is expected
+ONE_ANGLE = 0.05  # of the motion: by so much, at most, markers on one arm move on it
 HANGS = 0.5  # of an arm: how far its end is below the pivot on average, at least, where that tells what is up
 PIECES = {1: (3.0, 5.0), 2: (2.0, 2.0), 3: (1.0, 1.0)}  # s that are fitted and predicted at most, by arms: two diverge
 ARMS = {1: ["arm"], 2: ["upper", "lower"], 3: ["upper", "middle", "lower"]}
@@ -55,10 +57,19 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         f"{names[k + 1]} stays {radius:.6g} m from {names[k]}{', which does not move' * (k == 0)}: an arm"
         for k, radius in enumerate(radii)
     ]
+    beside = [name for k, name in enumerate(r.markers) if k not in joints]
+    if beside:
+        notes.append(f"{joined(beside)} {'is' if len(beside) == 1 else 'are'} on the same arms, and not used")
     unknown = [
         "masses: the motion shows only their ratios. One of them is set to 1 kg (or 1 kg m^2), and the others are "
         "relative to it"
     ]
+    if len(arms) == 1:
+        unknown.append(
+            "how its hinge loses energy: dry friction and the drag of air are fitted, and a viscous hinge looks like a "
+            "mixture of both. Then arm_friction is too large: in an example 0.020 for 0.007 N m, without a warning. "
+            "Compare a fit with `viscosity` in [[scene.pendulum]] and [parameters.arm_hinge_viscosity]"
+        )
     if len(arms) > 1:
         unknown.append("how the arms that hang share a mass at their hinges: it moves like a part of either one")
     apart = max(_drift(s, a, b) for a, b in pairwise(joints))
@@ -153,21 +164,47 @@ def _parameters(arms: Sequence[str], radii: Sequence[float]) -> dict[str, dict[s
 def _joints(s: Seen) -> list[int] | None:
     """The pivot and the ends of the arms, in order."""
     x, count = s.recording.positions, len(s.recording.markers)
-    if not 2 <= count <= 4 or len(s.still) != 1 or len(s.recording.times) < LEAST_FRAMES:
+    if count < 2 or len(s.still) != 1 or len(s.recording.times) < LEAST_FRAMES:
         return None
     order, left = [s.still[0]], set(range(count)) - set(s.still)
     while left:
         steady = [k for k in left if _change(s, order[-1], k) < (STRAIGHT if count < 4 else SEEN_ASKEW)]
-        if len(steady) > 1:  # arms that swing as one
+        if len(steady) > 1:  # arms that swing as one, or several markers on an arm
             rigid = [k for k in steady if _rigid(s, order[-1], k)]
-            steady = rigid if rigid or count < 4 else [min(steady, key=lambda k: s.apart[order[-1], k])]
-        if len(steady) != 1:
+            steady = rigid if rigid or count != 4 else [min(steady, key=lambda k: s.apart[order[-1], k])]
+        end = (
+            _end_of_arm(s, order[-1], steady, left.difference(steady)) if len(steady) > 1 else min(steady, default=None)
+        )
+        if end is None:
             return None
-        order.append(steady[0])
-        left.remove(steady[0])
-    if count == 4 and not all(_rigid(s, a, b) for a, b in pairwise(order)) and _bends(x[:, order]):
+        order.append(end)
+        left.difference_update(steady)
+    if len(order) - 1 > max(ARMS):
+        return None
+    if len(order) == 4 and not all(_rigid(s, a, b) for a, b in pairwise(order)) and _bends(x[:, order]):
         return None  # a rope almost keeps these distances
     return order
+
+
+def _end_of_arm(s: Seen, base: int, markers: Sequence[int], others: set[int]) -> int | None:
+    """The marker at the end of a rigid arm that has several: where the next arm hangs, of the last arm the outermost
+    one. None where they do not turn by one angle about the base: distances along a rope hardly change where it swings a
+    little."""
+    x = s.recording.positions
+    off = x[:, markers] - x[:, [base]]
+    across, up = sorted(np.argsort(np.nanmax(np.abs(off), axis=(0, 1)))[1:])
+    turned = off[..., across] + 1j * off[..., up]
+    outermost = int(np.argmax(s.apart[base, markers]))
+    turned = turned * np.exp(-1j * np.angle(turned[:, [outermost]]))
+    moved = np.sqrt(np.nanvar(off, axis=0).sum(axis=1))
+    allowed = max(TURNED * s.noise, 1e-3 * float(s.apart[base, markers[outermost]]))
+    if np.nanstd(turned, axis=0).max() > allowed or allowed > ONE_ANGLE * moved.max():
+        return None
+    carries = {k: sum(_rigid(s, k, other) for other in others) for k in markers}
+    if not others:
+        return markers[outermost]
+    end = max(carries, key=lambda k: carries[k])
+    return end if carries[end] else None
 
 
 def _change(s: Seen, a: int, b: int) -> float:

@@ -12,7 +12,7 @@ from ..errors import RecordingError
 from .end_load import free_end
 from .falls import falls
 from .held import Hands, Held, held, parts
-from .line import snapped, tangent
+from .line import chain, snapped, tangent, turns_sharply
 from .lying import table_under
 from .marked import marked_by
 from .one_rope import check_one_rope
@@ -37,7 +37,7 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     s = takes[0].seen
     hands, order = parts(s)
     own = sorted((*(k for body in hands for k in body), *order))
-    if len(order) < 3 or (not s.static and set(order) <= set(s.still)):  # or the markers of a clamp
+    if len(order) < 3 or (not s.static and set(order) <= set(s.still)) or _of_a_body(s, order):  # or those of a clamp
         return None
     if len(own) < len(s.recording.markers):
         return _without_others(takes, measured, [s.recording.markers[k] for k in own])
@@ -76,6 +76,12 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     driving = tuple(name for here in rope.marked for grip in here.held.grips for name in grip["markers"])
     above = "xyz"[s.up] if table is not None and s.up_by == "guess" else None
     return Description(kind, notes_of(rope), unknown_of(rope), lines_of(rope), above, driving)
+
+
+def _of_a_body(s: Seen, order: tuple[int, ...]) -> bool:
+    """Whether some of the markers are on a rigid body, as on a box that is pushed: the line through them turns back,
+    as no rope between them does."""
+    return any(set(body) <= set(order) and turns_sharply(s.apart, chain(s.apart, body)) for body in s.bodies)
 
 
 def _upside_down(s: Seen, found: Held, order: tuple[int, ...]) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,12 +17,14 @@ from .line import plane, snapped
 from .lying import Table
 from .marked import Marked
 from .seen import Seen
+from .stretching import Stretch, stretching
 from .take import Measured, Take
 
 Array = np.ndarray
 FITTED, LONGEST = 2 / 3, 3.0  # share of the time that is fitted, and s at most; the next third is predicted
 ROUND = 0.75  # GJ/EI of a round solid section with a Poisson ratio of 1/3
 LEAST_SIGMA = 1e-4  # m, of the markers of a motion: a model misses by as much
+UNSEEN = 30.0  # by which factor a mass may be off that nothing but the stretch of a rope tells of
 NUMBERS = 1500  # of a hand's motion, three for every fitted frame: so many are estimated in minutes
 
 
@@ -35,12 +37,14 @@ class Known(NamedTuple):
 
 
 class Load(NamedTuple):
-    """A mass at the end `at` of a rope, kg, and in masses of 1 m of it; whether it was weighed."""
+    """A mass at the end `at` of a rope, kg, and in masses of 1 m of it; whether it was weighed, and by which factor it
+    may be off where it was not."""
 
     at: str
     mass: float
     meters: float
     weighed: bool = False
+    within: float = 5.0
 
 
 class Start(NamedTuple):
@@ -67,6 +71,7 @@ class RopeModel:
         load: at its free end.
         weighed: whether it was told what hangs there, if only nothing.
         table: that it lies on.
+        stretch: how much it stretches, where that is seen.
     """
 
     marked: Sequence[Marked]
@@ -81,6 +86,7 @@ class RopeModel:
     load: Load | None
     weighed: bool
     table: Table | None = None
+    stretch: Stretch | None = None
 
     @property
     def hangs_unknown(self) -> bool:
@@ -123,12 +129,25 @@ def model_of(
     """
     takes, found = [own.take for own in marked], marked[0].held
     s = takes[0].seen
-    length = _length(s, max(marked, key=lambda own: float(own.arcs[-1])), measured)
+    stretch = None if table is not None else stretching(s, found.order)
+    if stretch is not None:
+        marked = [_unloaded(own, stretch) for own in marked]
+    length = _length(s, max(marked, key=lambda own: float(own.arcs[-1])), measured, stretch)
     density = _density(s, measured)
     normal = plane(s.recording.positions[:, list(order)], length.value)
     in_space = not s.static and table is None and normal is None and "plane" not in found.rope
-    rod = in_space and _can_be_rod(s, found)
-    start = Start({"points": "recording"}, []) if s.static else _laid(s, found) if table else _start(s, found, rod)
+    load = _load(s, found, density.value, measured.weight, lies=table is not None)
+    if load is None and stretch is not None and measured.weight is None:
+        load = _stretching_load(found, density.value, length.value)
+    rod = in_space and stretch is None and _can_be_rod(s, found)
+    stretches = stretch is not None
+    start = (
+        Start({"points": "recording"}, [])
+        if s.static
+        else _laid(s, found)
+        if table
+        else _start(s, found, rod, stretches)
+    )
     return RopeModel(
         marked,
         [s.recording.markers[k] for k in order],
@@ -139,10 +158,18 @@ def model_of(
         rod=rod,
         start=start if pushed is None else start._replace(said=[pushed]),
         estimated=rod and _estimates_hand(takes, found),
-        load=_load(s, found, density.value, measured.weight, lies=table is not None),
+        load=load,
         weighed=measured.weight is not None,
         table=table,
+        stretch=stretch,
     )
+
+
+def _unloaded(own: Marked, first: Stretch) -> Marked:
+    """The markers of a recording where they are along a rope that stretches when it is shortest."""
+    here = stretching(own.take.seen, own.held.order)
+    arcs = own.arcs / (1.0 + first.by) if here is None else own.arcs[0] + here.arcs
+    return replace(own, arcs=arcs)
 
 
 def _load(s: Seen, found: Held, density: float, weight: float | None, lies: bool) -> Load | None:
@@ -156,7 +183,13 @@ def _load(s: Seen, found: Held, density: float, weight: float | None, lies: bool
     return None if load is None else Load(load[0], load[1] * density, load[1])
 
 
-def _length(s: Seen, longest: Marked, measured: Measured) -> Known:
+def _stretching_load(found: Held, density: float, length: float) -> Load | None:
+    """What likely stretches a rope with a free end: a mass there, to begin with three times that of the rope."""
+    at, meters = free_end(found), 3.0 * length
+    return None if at is None else Load(at, meters * density, meters, within=UNSEEN)
+
+
+def _length(s: Seen, longest: Marked, measured: Measured, stretch: Stretch | None) -> Known:
     """m, from what was measured, what the file tells, or the distances between markers."""
     last = float(longest.arcs[-1])
     if measured.length is not None:
@@ -173,6 +206,12 @@ def _length(s: Seen, longest: Marked, measured: Measured) -> Known:
     sum_of = f"the length: the sum of the distances from {a} to {b}"
     if s.static:
         return Known(last, False, f"{sum_of}, to 1 %. Measure it, and give --length")
+    if stretch is not None:
+        said = (
+            f"the length without load: from {a} to {b} it is {100.0 * stretch.by:.2g} % more at times. The "
+            "shortest one is taken, and fitted too. Measure it, and give --length"
+        )
+        return Known(last, False, said)
     said = (
         f"{sum_of}, which noise makes too long and bends make too short. "
         "It is fitted too. The rope beyond these markers is not seen: the model ends there. Measure it, and give "
@@ -211,12 +250,12 @@ def turns_freely(found: Held) -> bool:
     return not clamped and all(len(grip["markers"]) == 1 and "direction" not in grip for grip in found.grips)
 
 
-def _start(s: Seen, found: Held, rod: bool) -> Start:
-    """How a motion begins."""
+def _start(s: Seen, found: Held, rod: bool, stretches: bool) -> Start:
+    """How a motion begins: that of a rope that stretches through its markers, since a straight one has no load."""
     as_recorded = {"points": "recording"}
     if s.rest and not (rod and turns_freely(found)):
         return Start(as_recorded, [f"it rests for the first {s.rest:.2g} s"])
-    way = _straight(s, found.order)
+    way = None if stretches else _straight(s, found.order)
     if s.rest:
         return Start({"direction": way}, [f"it hangs straight and rests for the first {s.rest:.2g} s"])
     if not lets_go(s, found.order):

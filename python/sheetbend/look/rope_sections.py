@@ -65,6 +65,8 @@ def _rope(rope: RopeModel) -> dict[str, Any]:
         keys |= {"clamp_angles": True, "plane": rope.flat, "set_modes": list(SET_MODES)}
     if not rope.seen.static:
         keys |= {"bend_damping": None if rope.table else 0.01, "drag_linear": 0.1 * density}
+    if rope.stretch is not None:
+        keys |= {"EA": _tension(rope), "stretch_damping": 0.01}
     if rope.rod:
         keys |= {"GJ": ROUND * EI, "twist_damping": keys["bend_damping"]}
     if rope.keeps_roll:
@@ -73,6 +75,12 @@ def _rope(rope: RopeModel) -> dict[str, Any]:
     if "clamp_start" in keys and "direction" in start:
         keys["clamp_start"] = start["direction"]
     return keys
+
+
+def _tension(rope: RopeModel) -> float:
+    """N, of an axial stiffness that its weight and load stretch by as much as is seen."""
+    hangs = rope.density.value * rope.length.value + (0.0 if rope.load is None else rope.load.mass)
+    return 9.81 * hangs / rope.stretch.by if rope.stretch is not None else float("inf")
 
 
 def _why(rope: RopeModel) -> dict[str, str]:
@@ -155,7 +163,8 @@ def _parameters(rope: RopeModel) -> list[str]:
     for name, limits in _limits(rope).items():
         lines += table(f"[parameters.{name}]", limits)
     if rope.load is not None and not rope.load.weighed:
-        lines += table("[parameters.end_mass]", {"lower": 0.2 * rope.load.mass, "upper": 5.0 * rope.load.mass})
+        mass, within = rope.load.mass, rope.load.within
+        lines += table("[parameters.end_mass]", {"lower": mass / within, "upper": mass * within})
     for name, sd in rope.held.priors.items():
         lines += table(f"[parameters.rope_{name}]", {"prior": [0.0, sd]})
     for at in rope.held.angles:
@@ -165,7 +174,8 @@ def _parameters(rope: RopeModel) -> list[str]:
         if rope.seen.static:
             lines += table("[given.rope_length]", {"sd": LENGTH_SD})
         else:
-            lines += table("[parameters.rope_length]", {"prior": [rope.length.value, LENGTH_SD]})
+            sd = LENGTH_SD if rope.stretch is None else max(LENGTH_SD, 0.5 * rope.stretch.by)
+            lines += table("[parameters.rope_length]", {"prior": [rope.length.value, sd]})
     return lines
 
 
@@ -178,6 +188,9 @@ def _limits(rope: RopeModel) -> dict[str, dict[str, Any]]:
         if rope.table is None:
             found["rope_bend_damping"] = {"lower": 1e-5, "upper": 1.0}
         found["rope_drag_linear"] = {"lower": 1e-4 * density, "upper": 10.0 * density}
+    if rope.stretch is not None:
+        found["rope_EA"] = {"lower": 0.01 * _tension(rope), "upper": 1000.0 * _tension(rope)}
+        found["rope_stretch_damping"] = {"lower": 1e-5, "upper": 1.0}
     if rope.table is not None:
         found["table_friction"] = {"lower": 0.01, "upper": 2.0}
     if rope.rod:

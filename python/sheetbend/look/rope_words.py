@@ -6,7 +6,7 @@ from ..quantities.wording import short
 from .held import Held
 from .lying import RADIUS
 from .marked import said_of
-from .rope_model import ROUND, RopeModel
+from .rope_model import ROUND, UNSEEN, RopeModel
 from .text import joined
 
 TWIST = (
@@ -63,8 +63,14 @@ def notes_of(rope: RopeModel) -> list[str]:
         said.append(
             f"it lies at one height, {height} m, as on a table: the table is a plane, and its friction is fitted"
         )
+    if rope.stretch is not None:
+        said.append(
+            f"it stretches: it is up to {100.0 * rope.stretch.by:.2g} % longer than at other times. EA is fitted"
+        )
     said += rope.start.said
-    if rope.load is not None:
+    if rope.load is not None and rope.load.within == UNSEEN:
+        said.append("its weight alone would hardly stretch it: its free end is taken to carry a mass, which is fitted")
+    elif rope.load is not None:
         meters = f"{rope.load.meters:.2g}"
         counted = f"{short(rope.load.mass)} kg, as given" if rope.load.weighed else "it is fitted"
         said.append(f"its free end carries a mass, some {meters} times that of 1 m of the rope: {counted}")

@@ -104,7 +104,7 @@ def seen(recording: Recording, up: str | None = None) -> Seen:
     if up is not None:
         down = np.where(np.array(list("xyz")) == up[-1], EARTH if up[0] == "-" else -EARTH, 0.0)
         recording = replace(recording, gravity=down)
-    if (found := strangers.rare(recording)) is not None:
+    if (found := strangers.twice(recording) or strangers.rare(recording)) is not None:
         return _without(recording, found, up)
     x, t = recording.positions, recording.times
     count = len(recording.markers)

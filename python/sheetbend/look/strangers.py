@@ -1,4 +1,4 @@
-"""Markers in a recording that belong to nothing that moves in it: reflections, and marks of the room.
+"""Markers in a recording that tell nothing of what moves in it: reflections, marks of the room, and copies.
 
 What holds an object is near it, or keeps its distance from the nearest marker on it. A mark of the room does neither.
 """
@@ -34,6 +34,15 @@ def rare(recording: Recording) -> Strangers | None:
     often = recording.mask.mean(axis=0)
     found = np.flatnonzero(often < RARE * often.max())
     return _strangers(recording, found, "seen in less than a fifth of the frames, and left out")
+
+
+def twice(recording: Recording) -> Strangers | None:
+    """Markers at the place of an earlier one in every frame, as a tool and the end of a rope that is welded to it in a
+    simulator."""
+    first: dict[bytes, int] = {}
+    places = [recording.positions[:, k].tobytes() for k in range(len(recording.markers))]
+    found = [k for k, place in enumerate(places) if first.setdefault(place, k) != k]
+    return _strangers(recording, found, "at the place of another marker in every frame, and left out")
 
 
 def restless(recording: Recording, noise: Array) -> Strangers | None:

@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 
 WIDTH = 110
+LARGE = 100.0  # from which on four decimals are finer than six digits
 
 
 def value(given: Any) -> str:
-    """A value as TOML; floats rounded to six digits."""
+    """A value as TOML; floats rounded to six digits, or to four decimals where that is finer, as times of a clock that
+    began long ago need it."""
     if isinstance(given, bool):
         return "true" if given else "false"
     if isinstance(given, str):
@@ -19,7 +21,8 @@ def value(given: Any) -> str:
     if isinstance(given, int | np.integer):
         return str(int(given))
     if isinstance(given, float | np.floating):
-        text = f"{float(given):.6g}"
+        number = float(given)
+        text = f"{number:.6g}" if abs(number) < LARGE else repr(round(number, 4))
         return text if any(c in text for c in ".en") else f"{text}.0"
     if isinstance(given, Mapping):
         return "{ " + ", ".join(f"{key(k)} = {value(v)}" for k, v in given.items()) + " }"

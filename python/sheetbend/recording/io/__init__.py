@@ -59,6 +59,12 @@ ELSEWHERE = {
 """What to do about files that laboratories have and that are not read, by suffix."""
 
 
+OF_JSON = (
+    "in Python: sb.Recording(positions, times, names).save('take.csv') of what json.load gives. If it is the JSON "
+    "beside a recording, give the recording"
+)
+
+
 def read(path: Path, units: str | None = None) -> MarkerData:
     """Read the recording at path and the JSON beside it; see `Recording.load`."""
     with reading(path):
@@ -107,7 +113,8 @@ def _format(path: Path) -> ModuleType:
         return FORMATS[path.suffix.lower()]
     except KeyError:
         known = " or ".join(FORMATS)
-        fix = ELSEWHERE.get(path.suffix.lower(), f"use a file that ends in {known}")
+        others = ELSEWHERE | {".json": OF_JSON}  # in a folder, such files stand beside recordings
+        fix = others.get(path.suffix.lower(), f"use a file that ends in {known}")
         raise RecordingError("path", "has a suffix that no reader knows", str(path), fix) from None
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from ...arrays.timeseries import Array
 from .cells import Row, number, refuse
 
-_WORDS = "time|timestamp|t|zeit|temps|tiempo|tempo|tijd|czas|время|时间|時間"
+_WORDS = "times?|time[ _]?stamps?|t|zeit|temps|tiempo|tempo|tijd|czas|время|时间|時間"
 _UNITS = "s|sec|seconds|sekunden|ms|msec|milliseconds|millisekunden|us|µs|ns"
 _NAME = re.compile(rf"(%time)|(?:{_WORDS})[\s_/,]*(?:in\s+)?[(\[]?\s*({_UNITS})?\s*[)\]]?", re.IGNORECASE)
 _LONGEST = 40  # characters: blanks of a longer one would be matched in ever more ways

@@ -32,12 +32,35 @@ _ALONE = re.compile(
 _LENGTHS = re.compile(
     r".*(?:distance|displacement|deflection|position|height|laser|abstand|auslenkung|weg)(?:[_. -]?\d+)?", re.IGNORECASE
 )
+_NAMED = re.compile(r"(?:marker|point|particle|node)?[_ ]?(?:id|name|label)|marker|point|particle|node", re.IGNORECASE)
 _TURNS = {"qx", "qy", "qz", "qw"}
 
 
 def beside(name: str) -> bool:
     """Whether a column holds what ROS writes beside places: a rotation, a header, a frame's name."""
     return len(name) <= _LONGEST and _BESIDE.fullmatch(name) is not None
+
+
+def of_names(header: Sequence[str]) -> int | None:
+    """The column with the name of a marker, in the header of a table with a row for each marker and frame."""
+    found = [k for k, name in enumerate(header[1:], start=1) if _NAMED.fullmatch(name)]
+    return found[0] if len(found) == 1 and len(header) == 2 + len(AXES) else None
+
+
+def coordinates(header: Sequence[str], own: Sequence[int]) -> tuple[list[int], list[str]]:
+    """Of columns, those that are x, y and z of markers, and the names of the others, such as the rotation of a tool or
+    the error of a camera. All columns where those of coordinates do not make up whole markers."""
+    places = [k for k in own if _is_coordinate(header[k])]
+    names = [without_unit(header[k])[0] for k in places]
+    whole = names and all(_marker_of(names[k : k + 3], 3) is not None for k in range(0, len(names), 3))
+    if not whole or {header[k].lower() for k in own} >= _TURNS:
+        return list(own), []
+    return places, [header[k] for k in own if k not in places]
+
+
+def _is_coordinate(name: str) -> bool:
+    bare = without_unit(name)[0]
+    return len(bare) <= _LONGEST and any(way.fullmatch(bare) for way in _WAYS)
 
 
 def markers(path: Path, line: int, names: Sequence[str]) -> tuple[list[str], str | None]:

@@ -77,8 +77,9 @@ def read(path: Path) -> MarkerData:
             refuse(path, line, f"must have {len(header)} cells, like the header", len(cells), fix)
     told = clock.unit(header[0])
     times = _counted(path, rows) if told is None else clock.times(path, rows, told)
-    if sorted(header[1:]) == ["marker", *_AXES]:
-        return _read_long(path, header, rows, times)
+    named = columns.of_names(header)
+    if named is not None:
+        return _read_long(path, header, header_line, rows, times, named)
     return _read_wide(path, header, header_line, rows, times)
 
 
@@ -167,6 +168,7 @@ def _read_wide(path: Path, header: list[str], header_line: int, rows: list[Row],
     again = [False, *(a[1] == b[1] for a, b in pairwise(rows))]  # a row that is there twice tells nothing
     rows, times = [row for row, twice in zip(rows, again, strict=True) if not twice], times[~np.array(again)]
     own = [k for k, name in enumerate(header) if k and not columns.beside(name)]
+    own, unread = columns.coordinates(header, own)
     names = [header[k] for k in own]
     if len(names) == 1:
         marker, axis, unit = columns.alone(path, header_line, names[0])
@@ -179,17 +181,23 @@ def _read_wide(path: Path, header: list[str], header_line: int, rows: list[Row],
         table = np.where(np.arange(3) == axis, table, 0.0 * table)  # nan stays nan
     elif len(names) == 2 * len(markers):
         table = np.insert(table, range(2, len(names) + 1, 2), 0.0 * table[:, 1::2], axis=1)
-    metadata = {} if unit is None else {"units": unit}
+    metadata: dict[str, object] = {} if unit is None else {"units": unit}
+    metadata |= {"columns_not_read": unread} if unread else {}
     return MarkerData(without_zeros(table.reshape(len(rows), -1, 3)), times, tuple(markers), metadata=metadata)
 
 
-def _read_long(path: Path, header: list[str], rows: list[Row], times: Array) -> MarkerData:
-    column = {name: i for i, name in enumerate(header)}
+def _read_long(
+    path: Path, header: list[str], header_line: int, rows: list[Row], times: Array, named: int
+) -> MarkerData:
+    places = [k for k in range(1, len(header)) if k != named]
+    if all(header[k] in _AXES for k in places):
+        places.sort(key=lambda k: header[k])
+    _, unit = columns.markers(path, header_line, [header[k] for k in places])
     for (line, _), time in zip(rows, times, strict=True):
         if np.isnan(time):
             refuse(path, line, "must have a time", "an empty cell or nan")
     frames, frame_of = np.unique(times, return_inverse=True)
-    markers = list(dict.fromkeys(cells[column["marker"]] for _, cells in rows))
+    markers = list(dict.fromkeys(cells[named] for _, cells in rows))
     marker_of = {marker: i for i, marker in enumerate(markers)}
 
     room = 24 * len(frames) * len(markers)
@@ -197,12 +205,13 @@ def _read_long(path: Path, header: list[str], rows: list[Row], times: Array) -> 
     positions = np.full((len(frames), len(markers), 3), np.nan)
     first_line: dict[tuple[int, str], int] = {}
     for (line, cells), frame in zip(rows, frame_of.tolist(), strict=True):
-        marker = cells[column["marker"]]
+        marker = cells[named]
         earlier = first_line.setdefault((frame, marker), line)
         if earlier != line:
             refuse(path, line, f"repeats marker {marker!r} at the time of line {earlier}", cells[0])
-        positions[frame, marker_of[marker]] = [number(path, line, cells[column[axis]]) for axis in _AXES]
-    return MarkerData(without_zeros(positions), frames, tuple(markers))
+        positions[frame, marker_of[marker]] = [number(path, line, cells[k]) for k in places]
+    metadata = {} if unit is None else {"units": unit}
+    return MarkerData(without_zeros(positions), frames, tuple(markers), metadata=metadata)
 
 
 def _check_times(path: Path, rows: list[Row], times: Array) -> None:

@@ -33,12 +33,11 @@ def read(path: Path) -> MarkerData:
     files = sorted((p for p in path.iterdir() if p.suffix.lower() in SUFFIXES), key=by_number)
     if len({file.suffix.lower() for file in files}) != 1:
         inside = sorted(p.name for p in path.iterdir())[:5]
-        raise RecordingError(
-            str(path),
-            f"holds no sequence of {' or of '.join(SUFFIXES)}",
-            inside,
-            "give a recording's file, or the folder of a sequence of meshes",
+        fix = (
+            "give a recording's file, several of the same thing, or the folder of a sequence of meshes. If each file "
+            "holds one marker, put them into one table: time,<marker>_x,<marker>_y,<marker>_z,..."
         )
+        raise RecordingError(str(path), f"holds no sequence of {' or of '.join(SUFFIXES)}", inside, fix)
     if "rate" not in sidecar.beside(path):
         fix = f'write {{"rate": 25, "units": "m"}} with the frames per second into {path.with_suffix(".json").name}'
         raise RecordingError(str(path.with_suffix(".json")), "does not say the rate", "no rate", fix)
