@@ -122,6 +122,31 @@ def test_a_fit_with_a_large_damping_three_times_too_large_is_doubtful() -> None:
     assert EI.verdict == "doubtful" and "the given rope_bend_damping is too large" in EI.words
 
 
+def arm(drag: float, inertia: float = 3e-3) -> tuple[sb.Scene, sb.Arm]:
+    scene = sb.Scene()
+    numbers = {"mass": 0.14, "first_moment": 0.016, "length": 0.25, "viscosity": 1e-4, "angle": 1.0, "rate": 0.5}
+    return scene, sb.add_arm(scene, inertia=inertia, drag=drag, **numbers)
+
+
+def test_a_drag_of_an_arm_is_named_where_the_fitted_loss_ran_off_to_nothing() -> None:
+    """The drag is given twice too large, so the viscosity goes to its limit. Beyond it, it would take what shows that
+    the drag is too large."""
+    scene, true = arm(2e-5)
+    times, solver = np.arange(201) / 50, sb.Solver(h=1 / 400)
+    recording = sb.Recording(np.zeros((len(times), 1, 3)), times, markers=("m",), name="swing")
+    places, fine = {"m": true.place(0.2)}, sb.Solver(h=1 / 1600)
+    e = sb.Experiment(scene=scene, recording=recording, markers=places, solver=fine, axes="xz", sigma=2e-4)
+    known = FitProblem([e], as_parameters(["arm_inertia"], [e]))
+    x = known.simulate(known.parameters.initial())[0]
+    x = x + 2e-4 * np.random.default_rng(0).standard_normal(x.shape)
+    model, own = arm(4e-5, 3.3e-3)
+    e = replace(e, scene=model, markers={"m": own.place(0.2)}, solver=solver, recording=replace(recording, positions=x))
+    found = fitted(e, "arm_inertia", "arm_hinge_viscosity", "arm_angle", "arm_rate")
+    assert found["arm_hinge_viscosity"].value < 1e-9
+    for name in ("arm_inertia", "arm_angle", "arm_rate"):
+        assert found[name].words.startswith("the given arm_drag is too large: less of it would explain 100 %")
+
+
 def test_a_drag_of_another_size_is_named_and_not_the_damping_that_is_right() -> None:
     losses = {"drag_linear": 0.005, "bend_damping": 0.01}
     e = fall(rope(drag_linear=0.015, bend_damping=0.01), **losses)

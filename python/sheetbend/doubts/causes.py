@@ -60,6 +60,7 @@ class Wrong:
         sure: explains nearly all; else a third or more of what is much more than noise.
         driven: with all taken out that another driven motion would explain.
         fitted: with the number fitted along, not to first order.
+        unbroken: of motions that were shot in windows, as one run of each shows it.
         causes: what explains so much of it, where it is not sure.
     """
 
@@ -71,6 +72,7 @@ class Wrong:
     sure: bool = True
     driven: bool = False
     fitted: bool = False
+    unbroken: bool = False
     causes: tuple[Cause, ...] = ()
 
 

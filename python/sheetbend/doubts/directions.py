@@ -71,6 +71,7 @@ def clearly(
             coarse mesh, right models asked for a damping.
     """
     _, r, J = problem.evaluate(u)
+    J = problem.parameters.inside(u) * J
     layout, taken = problem.rows_layout(), sum(map(problem.core.absorbed, range(len(problem.experiments))))
     column = np.where(mine, column, 0.0)
 

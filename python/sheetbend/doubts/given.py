@@ -101,11 +101,8 @@ class _Response:
     """-(J'J)^-1 on the parameters that the data determine and no bound holds, in physical units."""
 
     def __init__(self, problem: FitProblem, u: Array, J: Array) -> None:
-        lower, upper = problem.parameters.bounds()
-        near = 1e-6 * np.maximum(np.abs(u), 1e-3)
         size = np.linalg.norm(J, axis=0)
-        held = (u - lower <= near) | (upper - u <= near) | (size == 0)
-        self.columns = np.flatnonzero(~held)
+        self.columns = np.flatnonzero(problem.parameters.inside(u) & (size > 0))
         self.names = [problem.parameters.free[k] for k in self.columns]
         scaled = J[:, self.columns] / size[self.columns]
         _, s, Vt = np.linalg.svd(np.linalg.qr(scaled, mode="r"))

@@ -22,8 +22,12 @@ from ..statistics.intervals import NORMAL
 from ..statistics.least_squares import unexplained
 
 Array = np.ndarray
-LOSSES = ("_damping", "_viscosity", "_drag_linear", "_drag_quadratic", "_air_normal", "_air_tangential", "_loss_factor")
-"""Ends of the names of quantities that take energy."""
+LOSSES = (
+    *("_damping", "_viscosity", "_loss_factor"),
+    *("_drag", "_drag_linear", "_drag_quadratic", "_air_normal", "_air_tangential"),
+)
+"""Ends of the names of quantities that take energy, but for friction: in contacts it does more than that, and in hinges
+no derivative tells what more of it does to one that sticks."""
 KNOWN = 0.2  # relative half-width up to which a sum counts as known, as an identified parameter does
 AIR, LARGEST_DRAG = 1.2, 2.0  # kg/m^3; drag coefficient of a plate across the flow, and hardly anything has more
 COEFFICIENTS = ("_air_normal", "_air_tangential")

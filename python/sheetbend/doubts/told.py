@@ -55,8 +55,8 @@ GROUPS: Mapping[str, tuple[str, tuple[float, str]]] = {
 }
 """Told numbers that are no quantities, by the name under which a standard deviation is given: unit ("" where it is
 relative) and step."""
-TAKEN = (*LOSSES, "_drag", "_friction", "_dissipation")
-"""Ends of the names of quantities that take energy, those of bodies, arms and contacts among them."""
+TAKEN = (*LOSSES, "_friction", "_dissipation")
+"""Ends of the names of quantities that take energy, friction and what contacts dissipate among them."""
 GUESSED = 0.05
 """Step of Poisson's ratio and of a restitution: as losses, they are estimated rather than measured. A Poisson's ratio
 of 0.3, told as 0.45, made the E of a swinging bar 10 % too large."""
@@ -83,6 +83,7 @@ class Told:
         missing: of what has no number in the model, such as what it lacks (`missing_parts`): what a size of it says.
         signed: whether there may be less than none of what is missing.
         added: what one unit of it adds to inputs of the scene, of what is an error of these.
+        shared: whether all of several motions have it.
     """
 
     experiment: int
@@ -98,6 +99,7 @@ class Told:
     missing: Callable[[float], str] | None = None
     signed: bool = False
     added: Array | Input | list[Input] | None = None
+    shared: bool = False
 
 
 def told_numbers(problem: FitProblem, u: Array) -> tuple[list[Told], str]:

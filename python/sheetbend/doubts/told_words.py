@@ -15,7 +15,7 @@ def words_of(one: Told, more: float, problem: FitProblem, group: Sequence[int]) 
     if one.missing is not None:
         return one.missing(more)
     e = problem.experiments[one.experiment]
-    of = f" of {e.name}" if len(group) > 1 else ""
+    of = f" of {e.name}" if len(group) > 1 and not one.shared else ""
     size = short(abs(100 * more), 2) + " %"
     sign = "more" if more > 0 else "less"
     axis = f"{'' if more > 0 else '-'}{one.label.rsplit(' ', 1)[-1]}"

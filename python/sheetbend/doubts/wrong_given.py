@@ -43,6 +43,7 @@ from .lost_frames import lost_frames
 from .told import ASIDE, LARGER, LATER, SLOWER, Told, told_numbers
 from .told_inputs import FARTHER
 from .told_words import words_of
+from .unbroken import unbroken
 
 MUCH = 2.0
 """Times the noise, and the told sigma's where that is more: what a fit that misses much leaves beyond it. Residuals are
@@ -74,12 +75,12 @@ def wrong_given(
     Noise of what drives a scene hides a wrong number. So where much is left of a motion and no number explains nearly
     all of it, they are asked for what no other driven motion explains (`driven_span`).
     """
-    if isinstance(problem.core, Lifted):  # states of windows take up errors, too
-        return []
+    if isinstance(problem.core, Lifted):
+        return _of_unbroken(problem, u, refinement)
     ok, r, J = problem.evaluate_exactly(u)
     if not ok or not np.isfinite(J).all():
         return []
-
+    J = problem.parameters.inside(u) * J
     lacking = Lacking(problem, u)
 
     def asked(driven: Array | None = None) -> list[Wrong]:
@@ -95,6 +96,15 @@ def wrong_given(
     if _much_left(problem, u, sure) and (driven := driven_span(problem, u)).size:
         found = _surer(found, asked(driven))
     return _surer(found, _lost(problem, u, told, lacking, found, refinement))
+
+
+def _of_unbroken(problem: FitProblem, u: Array, refinement: Refinement | None) -> list[Wrong]:
+    """What explains nearly all that unbroken motions leave. Gaps may take up what nothing explains: they are there for
+    it."""
+    if (found := unbroken(problem, u)) is None:
+        return []
+    sure = [one for one in wrong_given(*found, told_numbers(*found)[0], refinement) if one.sure]
+    return [replace(one, steps=tuple(found[1] - u + s for s in one.steps), unbroken=True) for one in sure]
 
 
 def _surer(found: Sequence[Wrong], others: Sequence[Wrong]) -> list[Wrong]:
@@ -149,7 +159,8 @@ def _asked(
     for more in (known, driven):
         if more is not None:
             J = np.hstack([J, np.vstack([more, np.zeros((len(r) - data, more.shape[1]))])])
-    scale = np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny)
+    size = np.linalg.norm(J, axis=0)
+    scale = np.where(size > 0.0, size, 1.0)
     q, sizes, right = np.linalg.svd(J / scale, full_matrices=False)
     kept = sizes > RANK_TOLERANCE * sizes.max(initial=0.0)
     q, inverse = q[:, kept], right[kept].T / sizes[kept] / scale[:, None]
@@ -230,7 +241,8 @@ def _directions(
     each: dict[str, tuple[Told, Array]] = {}
     for one in within:
         own = one.name in ("clamps", "clamp_direction") or one.label.startswith(OWN)
-        labels = [(f"{one.label} {one.experiment}" if own or one.marker else one.label, one)]
+        own |= bool(one.marker)
+        labels = [(f"{one.label} {one.experiment}", one) if own else (one.label, replace(one, shared=len(group) > 1))]
         if one.marker:
             together = f"all {one.experiment} {one.label.rsplit(' ', 1)[-1]}", replace(one, marker="")
             labels = [*labels[: int(apart)], together]
@@ -304,4 +316,5 @@ def _sentence(problem: FitProblem, wrong: Wrong) -> str:
     whose = _whose(problem, wrong)
     part = short(100 * min(wrong.explained, 1.0), 2)
     noise = "noise, that of what drives it included," if wrong.driven else "noise"
-    return f"{part} % of what the fit leaves of {whose} beyond {noise} is as if {', or '.join(wrong.words)}"
+    fit = "a fit without `shooting`" if wrong.unbroken else "the fit"
+    return f"{part} % of what {fit} leaves of {whose} beyond {noise} is as if {', or '.join(wrong.words)}"

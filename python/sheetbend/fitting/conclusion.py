@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..doubts.against_priors import against_priors
 from ..doubts.beginnings import of_beginnings
 from ..doubts.beyond_bounds import beyond_bounds
 from ..doubts.bootstrap import bootstrap, wider
@@ -142,7 +143,8 @@ def _doubts(
     wrong = wrong_in_either((at.problem, at.u), fitted, told, refinement)
     warnings += wrong_given_warnings(at.problem, wrong)
     spin, undecided = spins_otherwise(*fitted, judged)
-    warnings += undecided
+    by_prior, off_priors = against_priors(at.problem, at.u, judged)
+    warnings += undecided + by_prior
     lacking = (
         doubts_of(at.problem, at.u, judged, wrong),
         missing_loss(at.problem, at.u, fitted, explained_by(at.problem, wrong), refinement),
@@ -150,6 +152,7 @@ def _doubts(
         spin,
         unstable_rests(*fitted),
         beyond_bounds(at.problem, at.u, judged),
+        off_priors,
     )
     return warnings, together(*lacking, drawn_off, contradicted)
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NoReturn
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays.checks import is_bound, is_number, is_several
 from ..arrays.timeseries import Array
@@ -255,6 +256,13 @@ class Parameters(Mapping[str, Parameter]):
         lower = np.array([self[name].to_internal(self[name].lower) for name in self.free])
         upper = np.array([self[name].to_internal(self[name].upper) for name in self.free])
         return lower, upper
+
+    def inside(self, u: Array) -> NDArray[np.bool_]:
+        """(free,) bool, what does not stand at one of `limits` at u (free,). What does takes up no residuals: a fit
+        would have taken what that step takes off them."""
+        near = 1e-6 * np.maximum(np.abs(u), 1e-3)
+        lower, upper = self.limits()
+        return (u - lower > near) & (upper - u > near)
 
     def limits(self) -> tuple[Array, Array]:
         """Internal bounds that a search keeps to, each of shape (free,): the user's, and `DEFAULT_RANGE` either way

@@ -8,8 +8,8 @@ from ..result.shot import ShotMotion
 from .tables import Section
 
 PUSHES = (
-    ", if these come at random. A friction or drag that the model lacks moves the parameters, and only a fit "
-    "without `shooting` looks for it"
+    ", if these come at random. A friction or drag that the model lacks moves the parameters; it is named where a fit "
+    "without `shooting` shows it"
 )
 
 
