@@ -21,7 +21,7 @@ BallPair<S> collided_vjp(const ImpactRule& rule, const BallPair<S>& pair, const 
   for (int first = 0; first < count; first += directions) {
     const int some = std::min(directions, count - first);
     BallPair<D> p;
-    p.joined = pair.joined;
+    p.joined = pair.joined, p.linked = pair.linked;
     i = 0;
     BallPair<D>::each(p, [&](D& a) {
       a = D(given[i]);

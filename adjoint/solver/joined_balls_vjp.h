@@ -1,6 +1,6 @@
 // The reverse of core/solver/joined_balls.h. With B the cotangent of D, whose derivative follows from that of (M + J^T a^-1 J)^-1:
 //
-//   dD_cd = U_c . dM U_d + y_c . dJ U_d + U_c . dJ^T y_d - y_c . da y_d - [c = d] dm/m^2
+//   dD_cd = U_c . dM U_d + y_c . dJ U_d + U_c . dJ^T y_d - y_c . da y_d - [c = d] dm/m^2        dm/m^2: the sum over the balls
 //
 // The other solution that a reverse of a linear system asks for is U and y themselves.
 #pragma once
@@ -13,7 +13,7 @@ namespace sheetbend {
 
 // Of one constraint.
 template <class T>
-void joint_vjp(const ContactSource<T>& source, const JoinedBall<T>& ball, const Member& m, const Matrix3<Single<T>>& B,
+void joint_vjp(const ContactSource<T>& source, const JoinedBalls<T>& ball, const Member& m, const Matrix3<Single<T>>& B,
                T* x_bar, const Inputs<T>& in_bar) {
   using S = Single<T>;
   const Group& group = source.scene.groups[m.group];
@@ -40,7 +40,7 @@ void joint_vjp(const ContactSource<T>& source, const JoinedBall<T>& ball, const 
   for (int k = 0; k < group.arity; ++k)
     source.add(Vec3<S>(own_x_bar + 3 * k), x_bar + source.scene.first_dof[nodes[k]]);
   for (int k = 0; k < group.parameters; ++k)
-    source.add(p_bar[k], in_bar.of(Quantity::rest)[JoinedBall<T>::first_parameter(group, m) + k]);
+    source.add(p_bar[k], in_bar.of(Quantity::rest)[JoinedBalls<T>::first_parameter(group, m) + k]);
   const Rates<S> rates = ball.rates(m);
   const S a_bar = rates.scale * softness_bar, g_bar = -(rates.a * rates.scale * a_bar);
   const int c = group.first + m.item;
@@ -58,22 +58,21 @@ template <class T>
 void taken_vjp(const ContactSource<T>& source, const Plan& plan, int one, int other, const Matrix3<Single<T>>& B,
                T* x_bar, const Inputs<T>& in_bar) {
   using S = Single<T>;
-  for (const int i : {one, other}) {
-    if (plan.assembly_of_ball[i] < 0) continue;
-    const Assembly& assembly = plan.assemblies[plan.assembly_of_ball[i]];
-    const int node = source.scene.balls.members[i].node;
-    const JoinedBall<T> ball(source, assembly, node);
-    const auto mass_bar = [&](int n) -> T& { return in_bar.of(Quantity::mass)[n]; };
+  const auto mass_bar = [&](int n) -> T& { return in_bar.of(Quantity::mass)[n]; };
+  for_each_joined(source, plan, one, other, [&](const Assembly& assembly, const JoinedBalls<T>& balls) {
     for (const auto& joined : assembly.joined)
       for (int d = 0; d < 3; ++d) {
         const S weight[3] = {B[d].x, B[d].y, B[d].z};
         for (int c = 0; c < 3; ++c)
-          source.add(weight[c] * dot(ball.U(joined.first, c), ball.U(joined.first, d)), mass_bar(joined.first));
+          source.add(weight[c] * dot(balls.U(joined.first, c), balls.U(joined.first, d)), mass_bar(joined.first));
       }
-    const S m = ball.mass(node);
-    source.add(-((B[0].x + B[1].y + B[2].z) / (m * m)), mass_bar(node));
-    for (const Member& member : assembly.members) joint_vjp(source, ball, member, B, x_bar, in_bar);
-  }
+    for (const int node : balls.balls()) {
+      if (node == JoinedBalls<T>::nothing) continue;
+      const S m = balls.mass(node);
+      source.add(-((B[0].x + B[1].y + B[2].z) / (m * m)), mass_bar(node));
+    }
+    for (const Member& member : assembly.members) joint_vjp(source, balls, member, B, x_bar, in_bar);
+  });
 }
 
 }  // namespace sheetbend

@@ -28,6 +28,7 @@ struct BallPair {
   Ball<S> one, other;
   S restitution{};
   bool joined = false;  // whether D is asked for
+  bool linked = false;  // by the same constraints
   std::array<Vec3<S>, 3> D{};
 
   int count() const { return joined ? numbers : alone; }
@@ -81,8 +82,9 @@ Surface<S> sphere_around(const BallPair<S>& p, bool rests) {
   return s;
 }
 
-// Of the inverse mass of two balls, what joints must leave of it.
-inline constexpr double least_yielding = 1e-9;
+// Of the inverse mass of two balls, what joints must leave of it. Where they link the two and leave less, it is them that end the approach: what is left of it
+// breaks them by a little, as sweeps and long substeps do, and a push that reverses it would be far larger than what does so.
+inline constexpr double least_yielding = 1e-9, least_yielding_of_linked = 0.2;
 
 // Deeper than this share of their radii together, overlapping balls hit each other: rounding is no impact.
 inline constexpr double no_overlap = 1e-12;
@@ -124,7 +126,8 @@ template <class S>
 S joined_push(const BallPair<S>& p, const Vec3<S>& n) {
   const S free = S(1.0) / p.one.mass + S(1.0) / p.other.mass;
   const S rest = free - (n.x * dot(p.D[0], n) + n.y * dot(p.D[1], n) + n.z * dot(p.D[2], n));
-  return value_of(rest) > least_yielding * value_of(free) ? free / rest : S(1.0);
+  const double least = p.linked ? least_yielding_of_linked : least_yielding;
+  return value_of(rest) > least * value_of(free) ? free / rest : S(1.0);
 }
 
 // Both flights after a meeting, whose time one step of Newton's method makes that of a scalar with tangents.

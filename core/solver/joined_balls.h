@@ -5,6 +5,9 @@
 //   U = M^-1 (E - J^T y) = (M + J^T a^-1 J)^-1 E
 //   D = 1/m - E^T U
 //
+// Two balls that the same constraints join have one E: that of the first less that of the second, for they are pushed apart. The inverse mass that both have
+// together is then E^T U = 1/m1 + 1/m2 - D.
+//
 // Soft constraints, of which a is large, take nothing. Tethers, kept volumes and constraints of the frames of rods are left out.
 #pragma once
 
@@ -25,14 +28,15 @@ namespace sheetbend {
 template <class S>
 using Matrix3 = std::array<Vec3<S>, 3>;
 
-// y and U of a ball, in one scene of a T.
+// y and U of a push on a ball, or on two that it parts, in one scene of a T.
 template <class T>
-class JoinedBall {
+class JoinedBalls {
  public:
   using S = Single<T>;
+  static constexpr int nothing = -1;
 
-  JoinedBall(const ContactSource<T>& source, const Assembly& assembly, int ball)
-      : source_(source), assembly_(assembly), ball_(ball), U_(assembly.joined.size()) {
+  JoinedBalls(const ContactSource<T>& source, const Assembly& assembly, int one, int other = nothing)
+      : source_(source), assembly_(assembly), balls_{one, other}, U_(assembly.joined.size()) {
     for (auto& column : y_) column.assign(Factor<S>::right_side(assembly.structure), S(0.0));
     load_gradients();
     solve();
@@ -40,7 +44,7 @@ class JoinedBall {
       const auto& [node, uses] = assembly.joined[i];
       for (int d = 0; d < 3; ++d) {
         Vec3<S>& u = U_[i][d];
-        if (node == ball) u = unit(d);
+        if (const double sign = sign_of(node); sign != 0.0) u = S(sign) * unit(d);
         for_each_row(uses, [&](int row, const Vec3<S>& gradient) { u = u - y_[d][row] * gradient; });
         u = (S(1.0) / mass(node)) * u;
       }
@@ -49,10 +53,13 @@ class JoinedBall {
 
   Matrix3<S> D() const {
     Matrix3<S> D;
-    for (int d = 0; d < 3; ++d) D[d] = (S(1.0) / mass(ball_)) * unit(d) - U(ball_, d);
+    for (const int ball : balls_)
+      if (ball != nothing)
+        for (int d = 0; d < 3; ++d) D[d] = D[d] + (S(1.0) / mass(ball)) * unit(d) - S(sign_of(ball)) * U(ball, d);
     return D;
   }
 
+  const std::array<int, 2>& balls() const { return balls_; }
   S mass(int node) const { return source_.read(source_.in.of(Quantity::mass)[node]); }
   const S& y(int row, int direction) const { return y_[direction][row]; }
   // Of what cannot move it is zero.
@@ -81,6 +88,7 @@ class JoinedBall {
   }
 
  private:
+  double sign_of(int node) const { return node == balls_[0] ? 1.0 : node == balls_[1] ? -1.0 : 0.0; }
   static Vec3<S> unit(int d) { return {S(d == 0 ? 1.0 : 0.0), S(d == 1 ? 1.0 : 0.0), S(d == 2 ? 1.0 : 0.0)}; }
 
   // Calls f(row, gradient) for these rows, with their gradients at the node that uses them.
@@ -115,8 +123,8 @@ class JoinedBall {
         for_each_row(uses, [&](int column, const Vec3<S>& other) {
           if (column <= row) A.values[structure.position(row, column)] += w * dot(own, other);
         });
-        if (node == ball_)
-          for (int d = 0; d < 3; ++d) y_[d][row] += w * dot(own, unit(d));
+        if (const double sign = sign_of(node); sign != 0.0)
+          for (int d = 0; d < 3; ++d) y_[d][row] += S(sign) * w * dot(own, unit(d));
       });
     }
     A.factorize(structure);
@@ -125,23 +133,32 @@ class JoinedBall {
 
   const ContactSource<T>& source_;
   const Assembly& assembly_;
-  int ball_;
+  std::array<int, 2> balls_;         // nodes
   std::vector<std::vector<S>> J_;    // per row
   std::array<std::vector<S>, 3> y_;  // per row
   std::vector<Matrix3<S>> U_;        // of each that is joined
 };
 
-// What is taken of the inverse mass of two balls that hit each other. Nothing where the same constraints join both: then their masses count alone.
+// Calls f with what joins two balls to others: at once where the same constraints join both.
+template <class T, class F>
+void for_each_joined(const ContactSource<T>& source, const Plan& plan, int one, int other, F&& f) {
+  const auto node = [&](int ball) { return source.scene.balls.members[ball].node; };
+  const int a = plan.assembly_of_ball[one], b = plan.assembly_of_ball[other];
+  if (a >= 0 && a == b)
+    return f(plan.assemblies[a], JoinedBalls<T>(source, plan.assemblies[a], node(one), node(other)));
+  if (a >= 0) f(plan.assemblies[a], JoinedBalls<T>(source, plan.assemblies[a], node(one)));
+  if (b >= 0) f(plan.assemblies[b], JoinedBalls<T>(source, plan.assemblies[b], node(other)));
+}
+
+// What is taken of the inverse mass of two balls that hit each other; nothing where none is joined to others.
 template <class T>
 std::optional<Matrix3<Single<T>>> taken_of(const ContactSource<T>& source, const Plan& plan, int one, int other) {
-  const int a = plan.assembly_of_ball[one], b = plan.assembly_of_ball[other];
-  if (a == b) return {};
-  Matrix3<Single<T>> sum;
-  for (const auto& [assembly, ball] : {std::pair(a, one), std::pair(b, other)}) {
-    if (assembly < 0) continue;
-    const auto D = JoinedBall<T>(source, plan.assemblies[assembly], source.scene.balls.members[ball].node).D();
-    for (int d = 0; d < 3; ++d) sum[d] = sum[d] + D[d];
-  }
+  std::optional<Matrix3<Single<T>>> sum;
+  for_each_joined(source, plan, one, other, [&](const Assembly&, const JoinedBalls<T>& joined) {
+    if (!sum) sum.emplace();
+    const auto D = joined.D();
+    for (int d = 0; d < 3; ++d) (*sum)[d] = (*sum)[d] + D[d];
+  });
   return sum;
 }
 

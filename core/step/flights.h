@@ -43,6 +43,7 @@ BallPair<Single<T>> pair_of(const ContactSource<T>& source, const Plan& plan, in
   BallPair<Single<T>> pair{ball_of(source, i, f), ball_of(source, k, g),
                            source.read(source.in.of(Quantity::restitution)[source.scene.balls.restitution])};
   if (const auto D = taken_of(source, plan, i, k)) pair.joined = true, pair.D = *D;
+  pair.linked = pair.joined && plan.assembly_of_ball[i] == plan.assembly_of_ball[k];
   return pair;
 }
 

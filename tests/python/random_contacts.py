@@ -28,6 +28,8 @@ UNITS = {"position": 1e-2, "velocity": 0.1, "gravity": 0.3, "collider_pose": 1e-
 FIELD = icosphere(0.06, 2)
 WIDER = 50_000
 """From this seed on: also dumbbells, flattened meshes and tethered bodies. Earlier ones keep their scenes."""
+RINGS = 100_000
+"""From this seed on: also rings of balls on rods, which hit each other."""
 
 
 def shape(rng: Draw, name: str, wider: bool) -> tuple[sb.Collider, str]:
@@ -90,7 +92,9 @@ def drawn(seed: int) -> Drawn:
     what = rng.choice(["points", "balls", "rope", "rod", "cloth", "body", "bodies", "ropes", "folded", "mixed"])
     if seed >= WIDER and rng.random() < 0.4:
         what = rng.choice(["dumbbells", "tethered"])
-    swept = what in ("points", "balls", "dumbbells", "rope", "cloth") and rng.random() < 0.4
+    if seed >= RINGS and rng.random() < 0.2:
+        what = "ring"
+    swept = what in ("points", "balls", "dumbbells", "ring", "rope", "cloth") and rng.random() < 0.4
     told.append(str(what))
     touching: list[object] = []
     points: dict[int, Array] = {}
@@ -152,6 +156,18 @@ def drawn(seed: int) -> Drawn:
         scene.add_constraints("distance", np.column_stack([ids[:n], ids[n:]]), name="rods", compliance=compliance)
         scene.add_collisions(ids, radius=0.01, restitution=float(rng.choice([0.0, 0.5, 1.0])))
         told.append(f"compliance {compliance:g}")
+        touching.append(ids)
+    elif what == "ring":
+        n = int(rng.integers(3, 7))
+        around = 2 * np.pi * np.arange(n) / n
+        out = np.column_stack([np.cos(around), np.sin(around), 0.0 * around])
+        x = above(0.024 / np.sin(np.pi / n) / 2 * out + rng.uniform(-1e-3, 1e-3, (n, 3)), 0.03 + height)
+        ids = scene.add_particles(x, rng.uniform(0.01, 0.1, n), thrown(rng, n) - rng.uniform(0, 2, (n, 1)) * out)
+        compliance, rods = float(rng.choice([0.0, 1e-7, 1e-4])), np.column_stack([ids, np.roll(ids, -1)])
+        rods = rods[: n - int(rng.integers(0, 2))]
+        scene.add_constraints("distance", rods, name="rods", compliance=compliance)
+        scene.add_collisions(ids, radius=0.01, restitution=float(rng.choice([0.0, 0.5, 1.0])))
+        told.append(f"{len(rods)} rods of {n} balls, compliance {compliance:g}")
         touching.append(ids)
     elif what == "tethered":
         body("box", up)

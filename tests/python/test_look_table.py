@@ -98,16 +98,19 @@ def test_a_rope_that_two_hands_move_over_a_table(tmp_path: Path) -> None:
 def test_a_fit_of_a_rope_on_a_table(tmp_path: Path) -> None:
     """A finer mesh and a shorter substep made it, and the hand that drags and turns it is as noisy as the rope.
 
-    With this noise of the hand EI is 4 % too small, by as much as its half-width, and what is not fitted is missed by
-    twice the noise; friction is doubtful for it. With the hand's true motion EI is 0.6 % too small.
+    With this noise of the hand EI is 4 % too small, which is named as doubtful, and what is not fitted is missed by
+    twice the noise. With the hand's true motion EI is 0.6 % too small. Mesh and substep are counted, because the start
+    follows the length that is fitted.
     """
     recording = takes.rope_on_table("body")
     drafted(tmp_path, recording, "--density", str(takes.DENSITY))
     result = run("fit", tmp_path / "take.toml", "--output", tmp_path / "out")
     assert result.exit_code in (0, 4), result.output
     found = sb.FitResult.load(tmp_path / "out/fit.json")
-    for name, true in {"table_friction": takes.FRICTION, "rope_EI": takes.STIFF}.items():
+    for name, true, share in (("table_friction", takes.FRICTION, 0.2), ("rope_EI", takes.STIFF, 0.1)):
         own = found[name]
-        assert abs(own.value - true) < (own.in_all or own.half_width) < 0.1 * true, name
+        assert own.verdict == "doubtful" and own.lower < true < own.upper, name
+        assert abs(own.value - true) < (own.in_all or own.half_width) < share * true, name
+    assert {made.name for made in found.refits} == {"time step", "finer mesh"} and not found.not_counted
     (take,) = found.recordings
-    assert take.held_out < 0.05 * take.baseline
+    assert take.held_out < 0.06 * take.baseline
