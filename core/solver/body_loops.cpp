@@ -25,6 +25,9 @@ bool closes_loop(const Scene& scene, const std::vector<Member>& members) {
     while (joined[b] != b) b = joined[b];
     return b;
   };
+  const auto is_held = [&](int node) { return scene.role[node] != Role::free; };
+  for (int b = 0; b < ground; ++b)
+    if (is_held(scene.bodies[b].center)) joined[b] = ground;
   std::map<std::tuple<int, int, int>, int> rows_between;  // of a group, two bodies
   for (const Member& m : members) {
     const Group& group = scene.groups[m.group];
@@ -32,7 +35,8 @@ bool closes_loop(const Scene& scene, const std::vector<Member>& members) {
     const auto end = [&](int k) {
       const int node = group.nodes(m.item)[k];
       const auto found = body_of.find(node);
-      return scene.role[node] != Role::free ? ground : found == body_of.end() ? -1 : found->second;
+      if (found == body_of.end()) return is_held(node) ? ground : -1;
+      return std::ranges::all_of(scene.bodies[found->second].axes, is_held) ? ground : found->second;
     };
     const auto [first, second] = std::minmax({end(0), end(1)});
     if (first < 0 || first == ground) continue;  // a particle, such as a pinned mean; or nothing moves

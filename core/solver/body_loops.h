@@ -13,6 +13,7 @@ inline constexpr double pivot_of_loop = 1e-6;  // 1e-3 rad
 
 // Whether these members close a loop of bodies, or of bodies and the ground. Two bodies are joined by a group that has two or three rows between points of
 // both, whatever its kind; by more rows they are joined twice. A single row, as of a spring or a stop, joins nothing.
+// A body whose center alone is held is joined to the ground there.
 bool closes_loop(const Scene& scene, const std::vector<Member>& members);
 
 // Puts what makes bodies rigid before what joins them, each in its order, so that of rows that say the same those of joints are left out: a joint in place of

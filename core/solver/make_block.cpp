@@ -140,8 +140,7 @@ std::vector<char> touching_itself(const Scene& scene) {
 DirectBlock make_block(const Scene& scene, std::vector<Member> members, const SolverOptions& options,
                        const std::vector<int>& loose) {
   const bool condensed = options.partition != Partition::direct;
-  const bool implicit = options.partition == Partition::implicit;
-  const double loop_pivot = !implicit && closes_loop(scene, members) ? pivot_of_loop : 0.0;
+  const double loop_pivot = closes_loop(scene, members) ? pivot_of_loop : 0.0;
   if (condensed && loop_pivot > 0.0) order_bodies_first(scene, members);
   std::vector<BlockVolume> volumes = volumes_around(scene, members);
   Elimination elimination = condensed ? Elimination{number_rows(scene, members, volumes), FactorStructure(0, {})}
@@ -149,7 +148,7 @@ DirectBlock make_block(const Scene& scene, std::vector<Member> members, const So
   for (const int node : loose) elimination.rows.push_back({node, {}});
   DirectBlock block{std::move(members), {}, {}, {0}, {}, {}, {}, 0, false, false, std::move(elimination.structure)};
   block.volumes = std::move(volumes);
-  block.implicit = implicit;
+  block.implicit = options.partition == Partition::implicit;
   block.loop_pivot = loop_pivot;
   if (condensed) block.condensation.emplace();  // to be filled in: it has no band
   std::map<int, int> particle_of;

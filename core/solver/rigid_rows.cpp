@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/constraints/rigid.h"
 #include "core/element/any_kind_hessian.h"
 #include "core/linear/low_fill.h"
 #include "core/scalar/pivot.h"
@@ -14,6 +15,7 @@ constexpr int at_row = sheetbend_blocks::row;
 constexpr double gives_way = 1e-10;     // D of a row that does, of J W J^T
 constexpr double softening = 1e-5;      // S, of J diag(K)^-1 J^T
 constexpr std::size_t few = 256;        // rows whose order is kept, as a border of H does (condensed.h)
+constexpr double far_less = 10.0;       // times: a row in a sum
 constexpr double no_stiffness = 1e150;  // a of a member that has been taken out: products with zero stay zero
 
 // A member's numbers as its kind wants them.
@@ -98,7 +100,8 @@ void RigidRows::place_rows(const DirectBlock& block) {
     J_.assign(J, 0.0);
     std::vector<std::pair<int, int>> entries;
     for (const auto& uses : uses_) add_entries_of_particle(uses, entries);
-    structure_ = FactorStructure(static_cast<int>(rows_.size()), entries, true, redundant_pivot);
+    structure_ = FactorStructure(static_cast<int>(rows_.size()), entries, block.loop_pivot == 0.0,
+                                 std::max(block.loop_pivot, redundant_pivot));
   };
   for (std::size_t m = 0; m < count; ++m) order[m] = static_cast<int>(m);
   std::sort(order.begin(), order.end(), [&](int m, int n) { return members[m].first < members[n].first; });
@@ -110,6 +113,8 @@ void RigidRows::place_rows(const DirectBlock& block) {
         if (const int p = particle(block, members[m], k); p < block.movable) joined[p].push_back(static_cast<int>(m));
     const std::vector<int> place = places_for_low_fill(static_cast<int>(count), joined);
     for (std::size_t m = 0; m < count; ++m) order[place[m]] = static_cast<int>(m);
+    if (block.loop_pivot > 0.0)  // as order_bodies_first()
+      std::ranges::stable_partition(order, [&](int m) { return members[m].kind == kind_of(Rigid::name); });
     put();
   }
   const std::size_t n = rows_.size();
@@ -185,6 +190,21 @@ void RigidRows::leave_out(const Given& given, const double* at) {
   factorize(given.block, at);
   const std::size_t before = structure_.banded() ? structure_.stored_band() : 0;
   for (int j = 0; j < size(); ++j) left_out_[j] = factor_.inverse[before + j] == 0.0;
+  if (given.block.loop_pivot == 0.0) return;
+  // A row is kept even if those before leave little of it, and bodies then have another balance nearby, where they stand apart. So a row of a joint that is
+  // left out takes the place of the one that has by far the largest share in it, when it is written as a sum of others.
+  for (int j = 0, swaps = 0; j < size() && swaps < size(); ++j) {
+    if (!left_out_[j] || !moves(j)) continue;
+    const std::vector<double> c = as_sum(given, at, j);
+    const auto share = [&](int i) { return c[i] * c[i] * weight_[j] / weight_[i]; };
+    int most = -1;
+    for (const Member& m : members_)
+      for (int i = m.first; m.kind != kind_of(Rigid::name) && i < m.first + m.count; ++i)
+        if (!left_out_[i] && (most < 0 || share(i) > share(most))) most = i;
+    if (most < 0 || share(most) <= far_less * far_less) continue;
+    left_out_[j] = false, left_out_[most] = true;
+    j = -1, ++swaps;  // the others are sums of other rows now
+  }
 }
 
 std::vector<double> RigidRows::as_sum(const Given& given, const double* at, int row) {

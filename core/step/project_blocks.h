@@ -67,12 +67,13 @@ void ProjectBlocks::forward(const Step<T>& step, Work<T>& work, Record<T>& recor
       damping_references(state, block, pack_kernels(), step.bdf.before, step.from, record.blocks[b]);
       load_contacts(
           block, [&](int lane) { return contact_source(step, work.masses, lane); }, *work.poses, record.blocks[b]);
-      let_loop_rows_give_way(state, block, pack_kernels(), step.from.x, record.blocks[b]);
-      if (block.implicit)
+      if (block.implicit) {
         project_implicit(state, block, plan.options, step.from, step.scenes, pack_kernels(), record.blocks[b]);
-      else
+      } else {
+        let_loop_rows_give_way(state, block, pack_kernels(), step.from.x, record.blocks[b]);
         for (int iteration = 0; iteration < plan.options.iterations; ++iteration)
           project_block(state, block, pack_kernels(), record.blocks[b], iteration);
+      }
       end_block(state, block, record.blocks[b]);
     }
   });

@@ -96,6 +96,17 @@ BodyScene sarrus() {
   return s;
 }
 
+// A wheel whose center is pinned, on a hinge beside it: the center holds what the hinge's point holds.
+BodyScene held_center() {
+  BodyScene s;
+  const Body frame = ground(s, BodyScene::upright());
+  const Body wheel = s.add_body({}, 0.5, {1e-3, 1e-3, 1.5e-3}, BodyScene::upright(), {0, 2.0, 0});
+  s.spec.pinned.push_back(wheel.center);
+  hinge(s, frame, {0, 0.1, 0}, wheel, {0, 0.1, 0});
+  s.add("across", nodes_of(frame, wheel, false), {1, 0, 0, 0, 0, 1}, 10.0);  // a spring against its turn
+  return s;
+}
+
 struct Loop {
   const char* name;
   BodyScene scene;
@@ -114,7 +125,8 @@ INSTANTIATE_TEST_SUITE_P(, TooManyRows,
                                            Loop{"HingeAndCylinder", door(hinge, cylinder), 4},
                                            Loop{"TwoCylinders", door(cylinder, cylinder), 4},
                                            Loop{"TwoSliders", door(slider, slider), 5}, Loop{"FourBar", four_bar(), 3},
-                                           Loop{"CrankAndSlider", crank_slider(), 3}, Loop{"Sarrus", sarrus(), 1}),
+                                           Loop{"CrankAndSlider", crank_slider(), 3}, Loop{"Sarrus", sarrus(), 1},
+                                           Loop{"HeldCenter", held_center(), 3}),
                          [](const auto& info) { return info.param.name; });
 
 TEST_P(TooManyRows, AreLookedForInALoop) {

@@ -37,9 +37,8 @@ def test_gradients_are_exact_where_forces_were_1e4_times_too_large(seed: int) ->
     assert max(found.values()) < BOUND, parts
 
 
-@pytest.mark.parametrize("method", ["direct", "newton", "newton_cg"])
-def test_a_door_in_drag_has_the_forces_between_its_hinges_that_implicit_finds(method: str) -> None:
-    """`implicit` finds the forces, and refuses their derivative."""
+@pytest.mark.parametrize("method", ["direct", "newton", "newton_cg", "implicit"])
+def test_a_door_in_drag_has_small_forces_between_its_hinges(method: str) -> None:
     scene, solver, _ = scene_of(189)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", sb.RedundantConstraintsWarning)
@@ -66,12 +65,18 @@ def test_newton_holds_a_loop_with_the_forces_of_direct(seed: int) -> None:
     assert max(differs(seed)[0].values()) < 1e-9
 
 
-def test_implicit_refuses_the_derivative_of_a_door_on_two_hinges() -> None:
-    scene, solver, _ = scene_of(189)
-    careful = replace(solver, method="implicit")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", sb.RedundantConstraintsWarning)
-        motion = sb.simulate(scene, [0.0, 0.004], careful)
-    assert max(np.abs(f).max() for name, f in motion.forces.items() if name.startswith("j1")) < 2.0  # N
-    with pytest.raises(sb.UnbalancedError, match="nearly follow from one another"):
-        differs(189, careful)
+@pytest.mark.parametrize("seed", [189, 477, 572])
+def test_implicit_holds_a_loop_with_the_forces_of_direct(seed: int) -> None:
+    """Seed 572 did not balance, seed 477 had 15 kN between the hinges of a door where 30 N hold it, and the derivatives
+    of both others were refused."""
+    scene, solver, parts = scene_of(seed)
+    largest = []
+    for method in ("implicit", "direct"):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", sb.RedundantConstraintsWarning)
+            motion = sb.simulate(scene, [0.0, 0.002, 0.004, 0.012], replace(solver, method=method))
+        forces = [f for name, f in motion.forces.items() if name.startswith(("j", "loop"))]
+        largest.append(max(np.abs(f).max() for f in forces))
+    assert largest[0] < 2.0 * largest[1]
+    found, _ = differs(seed, replace(solver, method="implicit"))
+    assert max(found.values()) < BOUND, parts
