@@ -195,7 +195,11 @@ void RigidRows::leave_out(const Given& given, const double* at) {
   // left out takes the place of the one that has by far the largest share in it, when it is written as a sum of others.
   for (int j = 0, swaps = 0; j < size() && swaps < size(); ++j) {
     if (!left_out_[j] || !moves(j)) continue;
-    const std::vector<double> c = as_sum(given, at, j);
+    std::vector<double> c = matrix(given.block, at, j);
+    for (int i = 0; i < size(); ++i)
+      if (left_out_[i]) c[i] = 0.0;
+    c.resize(Factor<double>::right_side(structure_));
+    factor_.solve(structure_, c.data());
     const auto share = [&](int i) { return c[i] * c[i] * weight_[j] / weight_[i]; };
     int most = -1;
     for (const Member& m : members_)
@@ -203,6 +207,7 @@ void RigidRows::leave_out(const Given& given, const double* at) {
         if (!left_out_[i] && (most < 0 || share(i) > share(most))) most = i;
     if (most < 0 || share(most) <= far_less * far_less) continue;
     left_out_[j] = false, left_out_[most] = true;
+    factorize(given.block, at);
     j = -1, ++swaps;  // the others are sums of other rows now
   }
 }
