@@ -1,9 +1,12 @@
 """Priors that the data contradict.
 
 A density that is told wrong leaves no trace in the residuals beside a fitted stiffness, since the two trade exactly. A
-prior of the stiffness, from another experiment, is all that can tell. With its mean m and standard deviation s, the
-estimate u and its variance v, the data alone ask for x = m + (u - m)/(1 - v/s^2), and x - m has the variance
-s^2/(1 - v/s^2) where both are right.
+prior of the stiffness, from another experiment, is all that can tell.
+
+With its mean m and standard deviation s, and the share h of an estimate u that comes from the prior (its
+leverage; the rest comes from the data), the data alone ask for x = m + (u - m)/(1 - h). Where both are right, u - m has
+the variance (1 - 2 h) s^2 + v. Here v is the variance of u, with correlated noise and errors of given values included;
+for white noise alone it is h s^2.
 """
 
 from __future__ import annotations
@@ -14,6 +17,7 @@ import numpy as np
 
 from ..arrays.timeseries import Array
 from ..minimum.problem import FitProblem
+from ..minimum.smooth import modes_of_fields
 from ..optional import require
 from ..quantities.parameters import Parameter
 from ..quantities.wording import short
@@ -23,32 +27,37 @@ from ..statistics.least_squares import solved
 from .contradictions import value_words
 from .directions import LEVEL
 
-LEAST = 1e-3  # of the prior's variance: what the data must take off it to contradict it
+LEAST = 1e-3  # share of the estimate that must come from the data for them to contradict the prior
 
 
 def against_priors(problem: FitProblem, u: Array, judged: Identifiability) -> tuple[tuple[str, ...], dict[str, str]]:
     """A warning for each prior that the data contradict at u (free,), and by parameter that would leave its interval
-    without that prior, why it is doubtful. Takes no simulation."""
+    without that prior, why it is doubtful. Takes no simulation. Priors of fields are not asked: a fit finds them."""
     estimates, names = {e.name: e for e in judged.estimates}, problem.parameters.free
     reach = np.array([reach_of(problem.parameters[name], estimates[name]) for name in names])
     _, r, J = problem.evaluate(u)
+    inside, fields = problem.parameters.inside(u), modes_of_fields(problem.experiments)
+    J = inside * J
     first, _ = problem.prior_rows
-    priors = [name for name in names if problem.parameters[name].prior is not None]
+    rows = {name: first + k for k, name in enumerate(n for n in names if problem.parameters[n].prior is not None)}
+    priors = [name for name in rows if inside[names.index(name)] and name.partition("[")[0] not in fields]
     warnings, doubts = list[str](), dict[str, str]()
-    for row, name in enumerate(priors, start=first):
-        p, k = problem.parameters[name], names.index(name)
+    for name in priors:
+        p, k, row = problem.parameters[name], names.index(name), rows[name]
         assert p.prior is not None
-        mean, sd = p.to_internal(p.prior[0]), p.prior[1]
-        left = 1.0 - (reach[k] / NORMAL / sd) ** 2
-        if not left > LEAST:
+        sd = p.prior[1]
+        share = float(J[row] @ solved(J, np.eye(1, len(J), row)[0]))
+        variance = max((reach[k] / NORMAL / sd) ** 2, share)  # of the estimate, in units of the prior's
+        if not (1.0 - share > LEAST and math.isfinite(variance)):
             continue
-        score = abs(u[k] - mean) / sd / math.sqrt(left)
+        score = abs(r[row]) / math.sqrt(1.0 - 2.0 * share + variance)
         if 2.0 * float(require("scipy.special", "fit").ndtr(-score)) > LEVEL / len(priors):
             continue
-        alone = value_words(p, u[k], (u[k] - mean) * (1.0 / left - 1.0), reach[k] / math.sqrt(left))
+        data = sd / (1.0 - share)
+        step, width = data * r[row] * share, data * NORMAL * math.sqrt(variance - share**2)
         words = (
-            f"the data alone ask for {name} = {alone}, which its prior ({_words(p)}) contradicts: "
-            f"{short(score, 2)} standard deviations"
+            f"the data alone ask for {name} = {value_words(p, u[k], step, width)}, which its prior ({_words(p)}) "
+            f"contradicts: {short(score, 2)} standard deviations"
         )
         warnings.append(f"{words}. Check the prior, and the given values with which {name} trades")
         steps = -solved(np.delete(J, row, axis=0), np.delete(r, row))

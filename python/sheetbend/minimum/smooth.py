@@ -102,10 +102,8 @@ def with_fields(
         InputError: no scene has such a field, a mode is a parameter already, a size or length is not positive, or an
             input over time does not suit a recording.
     """
-    scenes = [e.scene for e in experiments]
-    objects = [o for s in scenes for o in (*s.solids.values(), *s.cloths.values(), *s.ropes.values())]
     fitted = {e.name for e in experiments if e.predict is None}
-    known: dict[str, Modes] = {o.field.name: o.field for o in objects if o.field is not None}
+    known: dict[str, Modes] = {field.name: field for field in _stiffness_fields(experiments)}
     over_time = inputs_over_time(experiments)
     known |= {name: next(iter(own.values())) for name, own in over_time.items()}
     fields = []
@@ -171,6 +169,18 @@ def inputs_over_time(experiments: Sequence[Experiment]) -> dict[str, dict[str, O
                 raise InputError(f"{name}.duration", "ends before the recording", own.extent, fix)
             found.setdefault(name, {})[e.name] = own
     return found
+
+
+def _stiffness_fields(experiments: Sequence[Experiment]) -> Iterator[StiffnessField]:
+    for s in (e.scene for e in experiments):
+        objects = (*s.solids.values(), *s.cloths.values(), *s.ropes.values())
+        yield from (o.field for o in objects if o.field is not None)
+
+
+def modes_of_fields(experiments: Sequence[Experiment]) -> set[str]:
+    """The quantities that make up the fields of the experiments' scenes, unknown inputs over time among them."""
+    stiffness = {mode for field in _stiffness_fields(experiments) for mode in field.modes}
+    return stiffness | modes_over_time(experiments)
 
 
 def modes_over_time(experiments: Sequence[Experiment]) -> set[str]:
