@@ -7,10 +7,13 @@ estimate to a minimum of it, its residuals are asked for what is wrong.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from ..arrays.timeseries import Array
+from ..experiment.experiment import Experiment
 from ..minimum.approach import Approach
+from ..minimum.discretization import Refinement
 from ..minimum.growth import growths
 from ..minimum.optimizers import WALK, WALK_PROMISE
 from ..minimum.problem import FitProblem
@@ -20,7 +23,7 @@ from .roughness import rough_parameters
 def unbroken(problem: FitProblem, u: Array) -> tuple[FitProblem, Array] | None:
     """The problem with no motion cut, and its minimum near u (free,); None where differences grow too fast along a
     motion, or few steps lead to none."""
-    whole = problem.of([replace(e, shooting=None) for e in problem.experiments])
+    whole = problem.of(_uncut(problem.experiments))
     grown = growths(whole, u)
     if any(growth.until is not None for growth in grown):
         return None
@@ -31,3 +34,13 @@ def unbroken(problem: FitProblem, u: Array) -> tuple[FitProblem, Array] | None:
     if not ok or walk.promised > WALK_PROMISE:
         return None
     return None if rough_parameters(whole, walk.u, J[: whole.core.data_rows], grown) else (whole, walk.u)
+
+
+def unbroken_refinement(refinement: Refinement) -> Refinement:
+    """The same with no motion cut on the finer mesh either."""
+    made = refinement.finer
+    return refinement if made is None else replace(refinement, finer=lambda: _uncut(made()))
+
+
+def _uncut(experiments: Sequence[Experiment]) -> list[Experiment]:
+    return [replace(e, shooting=None) for e in experiments]

@@ -43,7 +43,7 @@ from .lost_frames import lost_frames
 from .told import ASIDE, LARGER, LATER, SLOWER, Told, told_numbers
 from .told_inputs import FARTHER
 from .told_words import words_of
-from .unbroken import unbroken
+from .unbroken import unbroken, unbroken_refinement
 
 MUCH = 2.0
 """Times the noise, and the told sigma's where that is more: what a fit that misses much leaves beyond it. Residuals are
@@ -103,6 +103,7 @@ def _of_unbroken(problem: FitProblem, u: Array, refinement: Refinement | None) -
     it."""
     if (found := unbroken(problem, u)) is None:
         return []
+    refinement = None if refinement is None else unbroken_refinement(refinement)
     sure = [one for one in wrong_given(*found, told_numbers(*found)[0], refinement) if one.sure]
     return [replace(one, steps=tuple(found[1] - u + s for s in one.steps), unbroken=True) for one in sure]
 
