@@ -64,6 +64,39 @@ def test_markers_carry_the_director_by_the_shortest_rotation():
     assert np.abs((grip.director * grip.direction).sum(axis=1)).max() < 1e-12
 
 
+@pytest.mark.parametrize("place", [(0.5, 0.0, 0.0), (0.0, 0.0, 0.0), (0.2, 0.3, 0.0), (3.0, 0.0, 0.0)])
+def test_a_rope_with_a_grip_at_its_end_alone_is_straight_and_ends_there(place):
+    """Its last link was folded back on the others where the grip was nearer to `start` than the length."""
+    scene = sb.Scene("rope")
+    grip = sb.Grip.fixed(place, (1.0, 0.0, 0.0))
+    rope = sb.add_rope(scene, length=1.0, segments=10, density=0.1, EI=1e-3, direction=(0.0, 0.6, 0.8), grip_end=grip)
+    back = np.linspace(-1.0, 0.0, 11)[:, None] * np.array([0.0, 0.6, 0.8])
+    assert scene.positions[rope.particles] == approx(np.array(place) + back, abs=1e-12)
+
+
+def test_a_clamp_stays_where_it_is_given_beside_a_grip_at_the_end():
+    """A fit of the start to the length moved the clamp."""
+
+    def at(x, EA):
+        scene, grip = sb.Scene("rope"), sb.Grip.fixed((x, 0.0, 0.0), (1.0, 0.0, 0.0))
+        size = {"length": 1.0, "segments": 4, "density": 0.1, "EI": 1e-3, "EA": EA}
+        rope = sb.add_rope(scene, **size, clamp_start=(1.0, 0.0, 0.0), grip_end=grip)
+        return scene.positions[rope.particles]
+
+    assert at(1.0, None)[:, 0] == approx([0.0, 0.25, 0.5, 0.75, 1.0], abs=1e-12)
+    assert at(1.2, 1e3)[:, 0] == approx([0.0, 0.3, 0.6, 0.9, 1.2], abs=1e-12)
+    with pytest.raises(sb.SceneError, match="cannot be bent to the length"):
+        at(0.9, 1e3)
+
+
+def test_points_that_meet_a_grip_in_the_wrong_place_are_refused():
+    """NumPy failed in an SVD of numbers that were none."""
+    grip = sb.Grip.fixed((0.5, 0.0, 0.0), (1.0, 0.0, 0.0))
+    line = [(0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (1.0, 0.0, 0.0)]
+    with pytest.raises(sb.SceneError, match="cannot be bent to the length"):
+        sb.add_rope(sb.Scene("rope"), length=1.0, segments=2, density=0.1, points=line, grip_end=grip)
+
+
 def test_a_grip_at_the_end_is_where_the_rod_enters_it():
     first, second = PLACES, PLACES + 0.03 * TURNS.apply([1.0, 0, 0])
     grip = sb.Grip.from_markers(TIMES, first, second, end=True)

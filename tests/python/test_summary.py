@@ -141,7 +141,10 @@ def test_the_given_value_that_matters_most_is_named(good: FitResult) -> None:
         name="length", value=1.0, unit="m", off_by=0.01, words="1 %", moved={"EI": 0.5}, leaves=0.0, sd=None
     )
     found = told(replace(good, premises=(premise,)))
-    assert found["next"].startswith("check that length is right to 0.2 %. If it is not") and "EI" in found["next"]
+    assert (
+        found["next"].startswith("check that the error in length is below 0.2 %. If it is not")
+        and "EI" in found["next"]
+    )
     assert "then" not in found
 
 

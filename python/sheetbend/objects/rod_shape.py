@@ -74,6 +74,8 @@ def fitted_to_length(shape: Array, link: float, held: Sequence[int]) -> Array:
         lengths = np.linalg.norm(edges, axis=1)
         if np.abs(lengths - link).max() < 1e-12 * link:
             return x
+        if lengths.min() < 1e-9 * link:  # such a link has no direction to grow in
+            break
         J = _of_lengths(x)[:, free].reshape(len(edges), -1)
         x[free] += np.linalg.lstsq(J, link - lengths, rcond=1e-9)[0].reshape(-1, 3)
     reach, apart = link * (len(x) - 1), float(np.linalg.norm(shape[-1] - shape[0]))

@@ -136,7 +136,7 @@ def add_rope(
         density: kg/m; nodes carry it by their Voronoi length.
         EA: axial stiffness N; None = inextensible.
         EI: bending stiffness N m^2; None = no bending.
-        start: (3,) m, where a straight initial shape begins.
+        start: (3,) m, where a straight initial shape begins; a `grip_end` alone moves it, so that the rope ends there.
         direction: (3,), of a straight initial shape; that of `clamp_start`, or else `clamp_end`, or x by default.
         points: (k, 3) m, an initial shape instead, resampled to equal links.
         velocity: (k, 3) m/s at `points`, which are then fitted to the length; at rest by default.
@@ -177,7 +177,13 @@ def add_rope(
     speeds = None
     if velocity is not None or any(grips):
         held = [None if grip is None else placed(grip) for grip in grips]
-        line = shape if points is None and grip_start is None else points
+        line = points
+        if points is None and grip_start is None:
+            line = shape
+            if held[1] is not None and clamp_start is None:
+                line = shape + (held[1][0] - shape[-1])
+            elif held[1] is not None:  # straight from the clamp to the grip
+                line, held[0] = None, (shape[0], unit_vector(f"{name}.{way[0]}", way[1]))
         shape, speeds = initial_shape(name, length, segments, line, velocity, held, EA is not None)
     optional = {"EA": EA, "EI": EI, "stretch_damping": stretch_damping, "bend_damping": bend_damping}
     check_positive(name, {"density": density}, optional)

@@ -146,6 +146,7 @@ def _before_use(result: FitData) -> Iterator[str]:
     if found:
         name = min(found, key=lambda n: n.endswith("]"))  # the report lists those of shared parameters first
         on = found[name]
-        yield f'check that {on.name} is right to {on.size}. If it is not, use "+/- in all" as the half-width of {name}'
+        checked = f"check that the error in {on.name} is below {on.size}"
+        yield f'{checked}. If it is not, use "+/- in all" as the half-width of {name}'
     if weak and "identified" in verdicts:
         yield narrower
