@@ -143,9 +143,9 @@ def test_a_length_in_another_unit_is_named() -> None:
 
     assert said() == ""
     long = said(scene=rope(length=50.0, EI=2e3))
-    assert "markers placed on rope are 1" in long and "100 is cm told as m" in long
-    assert "1000 is mm told as m" in said(recording=replace(e.recording, positions=1e3 * e.recording.positions))
-    assert "`sigma` of" in (noisy := said(sigma=0.5)) and "Told in mm, it would be 0.0005" in noisy
+    assert "markers placed on rope are 1" in long and "as if cm were given as m" in long
+    assert "as if mm were given as m" in said(recording=replace(e.recording, positions=1e3 * e.recording.positions))
+    assert "`sigma` of" in (noisy := said(sigma=0.5)) and "If it is in mm, write 0.0005" in noisy
     heavy = sb.Scene("rope")
     sb.add_rope(heavy, "rope", segments=8, length=0.5, density=0.05, EI=2e-3, clamp_start=(1, 0, 0))
     heavy.add_point_mass(8, 20.0, "plug")
@@ -178,7 +178,7 @@ def test_a_rope_that_whirls_and_a_bob_on_a_thread_are_plausible() -> None:
     e = sb.Experiment(scene=scene, recording=recording, markers=places, solver=SOLVER)
     assert list(other_units(e)) == []
     (words,) = other_units(replace(e, recording=replace(recording, positions=1e3 * x)))
-    assert "as far apart as placed on rope (1000 is mm told as m)" in words
+    assert "as far apart as placed on rope (as if mm were given as m)" in words
 
 
 def test_one_marker_at_rest_has_no_extent_to_compare_sigma_with() -> None:

@@ -1,4 +1,4 @@
-"""Sizes of a model that its recording contradicts: a length in mm told as m, markers elsewhere than measured.
+"""Sizes of a model that its recording contradicts: a length in mm given as m, markers elsewhere than measured.
 
 None of this stops a fit: a rope may be far longer than what its markers show. Where the factor is near 10, 100 or 1000,
 the sentence says which slip it looks like.
@@ -15,7 +15,11 @@ from ..experiment.experiment import Experiment
 from ..quantities.wording import short
 
 Array = np.ndarray
-SLIPS = {10: "10 is cm told as mm, or the other way round", 100: "100 is cm told as m", 1000: "1000 is mm told as m"}
+SLIPS = {
+    10: "as if cm were given as mm, or mm as cm",
+    100: "as if cm were given as m",
+    1000: "as if mm were given as m",
+}
 ALIKE = 1.6  # how far a factor may be from that of a slip
 APART, NEAR = 3.0, 0.1  # of their distance on the object: how far apart neighboring markers are, at most and at least
 UNSEEN = 5.0  # times the part that markers show: how long a rope is hardly ever
@@ -51,7 +55,7 @@ def other_units(e: Experiment, fitted: Container[str] = ()) -> Iterator[str]:
     if not alone and 0.0 < COARSE * extent < e.sigma:
         yield (
             f"`sigma` of {e.name} is {short(e.sigma)} m, and its markers stay within {short(extent, 2)} m: they then "
-            f"tell nothing. Told in mm, it would be {short(1e-3 * e.sigma)}"
+            f"determine nothing. If it is in mm, write {short(1e-3 * e.sigma)}"
         )
 
 
