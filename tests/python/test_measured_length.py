@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.config import build, load
+from sheetbend.objects.rod_shape import follow_length
 
 Array = np.ndarray
 LENGTH, MARKERS = 0.4, 9
@@ -84,3 +85,33 @@ def test_links_have_the_length_that_is_fitted(tmp_path: Path, kind: str, held: s
         held_nodes = [0, -1] if "-1" in held else [0]
         assert np.array_equal(at[held_nodes], as_given[held_nodes])
     assert max(error.values()) < error[1.0] + 1e-3, error
+
+
+def arch(sag: float, segments: int = 20) -> tuple[sb.Scene, sb.Rope]:
+    t = np.linspace(0.0, 1.0, segments + 1)
+    scene = sb.Scene("arch")
+    points = np.stack([t, 4 * sag * t * (1 - t), 0 * t], axis=1)
+    return scene, sb.add_rope(scene, points=points, segments=segments, density=0.1, EI=1e-3)
+
+
+@pytest.mark.parametrize(("sag", "follows"), [(0.1, True), (0.01, False)])
+def test_a_rope_almost_straight_between_held_ends_keeps_its_start(sag: float, follows: bool) -> None:
+    """One that sags by 10 mm on 1 m would move by 160 mm for 1 % of its length, if its sag grew linearly."""
+    scene, rope = arch(sag)
+    scene.pin(rope.particles[[0, -1]])
+    follow_length(scene, rope)
+    length = scene.quantities["rope_length"].value
+    moved = np.abs(start(scene, 1.01 * length) - start(scene, length)).max()
+    assert (moved > 0.01) if follows else moved == 0.0
+    assert moved < 0.02
+
+
+def test_an_end_on_a_body_stays_there() -> None:
+    scene, rope = arch(0.1)
+    plug = scene.add_body("plug", at=(1.0, 0.0, 0.0), mass=0.1, inertia=(1e-5, 1e-5, 1e-5))
+    sb.attach(plug, rope.particles[-1:])
+    scene.pin(rope.particles[:1])
+    follow_length(scene, rope)
+    length = scene.quantities["rope_length"].value
+    moved = start(scene, 1.01 * length) - start(scene, length)
+    assert np.array_equal(moved[[0, -1]], np.zeros((2, 3))) and np.abs(moved).max() > 0.01

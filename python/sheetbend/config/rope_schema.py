@@ -105,7 +105,8 @@ class Strand(Section):
     points: list[Vector] | Literal["recording"] | None = key(
         None,
         'initial shape as a polyline, or "recording": through the markers on it, as first measured '
-        "(their mean when static); a fit that changes the length bends this shape to it",
+        "(their mean when static); a fit that changes the length bends this shape to it, unless it is almost straight "
+        "between two held ends",
         "m",
     )
     velocity: Literal["recording"] | None = key(

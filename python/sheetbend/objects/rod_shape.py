@@ -17,6 +17,7 @@ from .grip import any_across, carried
 from .rope_grips import Chain
 
 SMOOTH = 0.1  # of a length: bends along less of it are those of noise, and stay
+FARTHEST = 5.0  # times the change of its length, by which a measured start moves that follows it
 
 
 def initial_shape(
@@ -88,21 +89,32 @@ def fitted_to_length(shape: Array, link: float, held: Sequence[int]) -> Array:
 
 def follow_length(scene: Scene, chain: Chain) -> None:
     """Let a measured start follow the quantity `<name>_length`: where a fit changes the length, nodes that are not held
-    start on a chain so long near by, whose bends change smoothly, to first order.
+    and not joined to other objects start on a chain so long near by, whose bends change smoothly, to first order.
 
     Otherwise rigid links that are longer than the nodes are apart would throw them apart in the first substep, where a
-    rope that lies straight cannot choose how it buckles and forces do not balance."""
+    rope that lies straight cannot choose how it buckles and forces do not balance. A chain that is almost straight
+    between two ends that stay keeps its start: how far it sags grows with the root of its length, not linearly."""
     nodes, length = chain.particles, float(chain.arc_length[-1])
-    x, free = scene.nodes[nodes], np.flatnonzero(~np.isin(nodes, scene.held))
+    x, free = scene.nodes[nodes], np.flatnonzero(~np.isin(nodes, [*scene.held, *_joined(scene, nodes)]))
     J = _of_lengths(x)[:, free].transpose(0, 2, 1)
     bends = np.diff(np.eye(len(x)), n=2, axis=0)[:, free] * (SMOOTH * (len(x) - 1)) ** 2
     way = np.tensordot(J, np.linalg.inv(np.eye(len(free)) + bends.T @ bends), 1)
     met = np.tensordot(J, way, ((1, 2), (1, 2)))
     pull = np.linalg.lstsq(met, np.full(len(met), 1.0 / len(met)), rcond=1e-9)[0]
     rate = np.tensordot(pull, way, 1).T.ravel()
+    if np.abs(rate).max(initial=0.0) > FARTHEST:
+        return
     at = (3 * nodes[free, None] + np.arange(3)).ravel()
     grown = Term("position", at, rate, ((f"{chain.name}_length", "identity"),))
     scene.add_terms([grown, Term("position", at, -length * rate, ())])
+
+
+def _joined(scene: Scene, nodes: Array) -> list[int]:
+    """Those of a chain's nodes that constraints join to bodies or to particles of other objects."""
+    bodies = [body.particles for body in scene.bodies.values()]
+    others = np.setdiff1d([*range(len(scene.positions)), *np.ravel(bodies)], nodes)
+    joined = [g.particles[np.isin(g.particles, others).any(axis=1)] for g in scene.groups]
+    return np.intersect1d(np.concatenate([np.ravel(j) for j in joined]), nodes).tolist()
 
 
 def _of_lengths(x: Array) -> Array:
