@@ -15,6 +15,7 @@ result rests on (`given.premises`).
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache, partial
@@ -239,11 +240,12 @@ def _directions(
         others |= {"draft"}  # which pushes like a gravity that is turned
     within = [one for one in told if one.experiment in group and one.name not in others]
     apart = len(within) * rows <= LONGEST
+    motions = Counter(label for label, _ in {(one.label, one.experiment) for one in within})
     each: dict[str, tuple[Told, Array]] = {}
     for one in within:
-        own = one.name in ("clamps", "clamp_direction") or one.label.startswith(OWN)
-        own |= bool(one.marker)
-        labels = [(f"{one.label} {one.experiment}", one) if own else (one.label, replace(one, shared=len(group) > 1))]
+        own = one.name in ("clamps", "clamp_direction") or one.label.startswith(OWN) or bool(one.marker)
+        label = f"{one.label} {one.experiment}" if own else one.label
+        labels = [(label, replace(one, shared=not own and motions[one.label] > 1))]
         if one.marker:
             together = f"all {one.experiment} {one.label.rsplit(' ', 1)[-1]}", replace(one, marker="")
             labels = [*labels[: int(apart)], together]
