@@ -98,7 +98,8 @@ class FitData:
         windows: s, the lengths that were fitted first, as given or chosen.
         condition: of the Jacobian where the fit started, in words; None where the motion diverges there.
         evaluations, jacobians: how often all experiments were simulated, and how often of these with a Jacobian, over
-            all starts and windows, up to the minimum.
+            all starts and windows, up to the minimum. They vary between equal fits, because a Jacobian is computed
+            with the residuals if it takes less than three times as long. The estimates do not depend on that.
         judging: how often all experiments, or some of them, were simulated besides, and how often of these with a
             Jacobian: for beginnings, limits, refits, profiles and doubts.
         forces: errors per force sensor.
