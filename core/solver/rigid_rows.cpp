@@ -35,6 +35,12 @@ struct Numbered : AnyConstraint<double> {
   }
 };
 
+// The kind that keeps a body rigid. It is found once: kind_of() compares names.
+int kind_of_bodies() {
+  static const int kind = kind_of(Rigid::name);
+  return kind;
+}
+
 }  // namespace
 
 void RigidRows::find(const Scene& scene, const Given& given, const double* at) {
@@ -114,7 +120,7 @@ void RigidRows::place_rows(const DirectBlock& block) {
     const std::vector<int> place = places_for_low_fill(static_cast<int>(count), joined);
     for (std::size_t m = 0; m < count; ++m) order[place[m]] = static_cast<int>(m);
     if (block.loop_pivot > 0.0)  // as order_bodies_first()
-      std::ranges::stable_partition(order, [&](int m) { return members[m].kind == kind_of(Rigid::name); });
+      std::ranges::stable_partition(order, [&](int m) { return members[m].kind == kind_of_bodies(); });
     put();
   }
   const std::size_t n = rows_.size();
@@ -195,16 +201,14 @@ void RigidRows::leave_out(const Given& given, const double* at) {
   // left out takes the place of the one that has by far the largest share in it, when it is written as a sum of others.
   for (int j = 0, swaps = 0; j < size() && swaps < size(); ++j) {
     if (!left_out_[j] || !moves(j)) continue;
-    std::vector<double> c = matrix(given.block, at, j);
-    for (int i = 0; i < size(); ++i)
-      if (left_out_[i]) c[i] = 0.0;
-    c.resize(Factor<double>::right_side(structure_));
-    factor_.solve(structure_, c.data());
+    const std::vector<double> c = as_sum(given, at, j);
     const auto share = [&](int i) { return c[i] * c[i] * weight_[j] / weight_[i]; };
     int most = -1;
-    for (const Member& m : members_)
-      for (int i = m.first; m.kind != kind_of(Rigid::name) && i < m.first + m.count; ++i)
+    for (const Member& m : members_) {
+      if (m.kind == kind_of_bodies()) continue;
+      for (int i = m.first; i < m.first + m.count; ++i)
         if (!left_out_[i] && (most < 0 || share(i) > share(most))) most = i;
+    }
     if (most < 0 || share(most) <= far_less * far_less) continue;
     left_out_[j] = false, left_out_[most] = true;
     factorize(given.block, at);
@@ -217,7 +221,6 @@ std::vector<double> RigidRows::as_sum(const Given& given, const double* at, int 
   for (int j = 0; j < size(); ++j)
     if (left_out_[j]) c[j] = 0.0;
   c.resize(Factor<double>::right_side(structure_));
-  factorize(given.block, at);
   factor_.solve(structure_, c.data());
   c.resize(D_.size());
   return c;
