@@ -9,9 +9,8 @@ import numpy as np
 from .seen import Seen
 
 Array = np.ndarray
-STRETCHES = (
-    0.02  # of its length: by so much a rope gets longer that stretches; those that do not stay within half of it
-)
+STRETCHES = 0.02  # of its length: a rope that stretches gets longer by more; others stay within a third of it
+STRAIGHT, FEWEST = 0.5, 5  # rad between neighbors at most, and markers: otherwise the line through them misses bends
 BY_NOISE = 5.0  # times the noise of a marker: by so much the length of a line through markers changes
 USUAL = (0.05, 0.95)  # quantiles between which a length changes
 
@@ -31,10 +30,13 @@ class Stretch(NamedTuple):
 
 
 def stretching(s: Seen, order: tuple[int, ...]) -> Stretch | None:
-    """How a rope that moves stretches; None where it hardly does."""
-    parts = arcs_between(s.recording.positions[:, list(order)])
-    parts = parts[np.isfinite(parts).all(axis=1)]
-    if s.static or not len(parts):
+    """How a rope that moves stretches, by frames in which it is almost straight; None where it hardly does."""
+    if s.static or len(order) < FEWEST:
+        return None
+    x = s.recording.positions[:, list(order)]
+    x = x[np.isfinite(x).all(axis=(1, 2))]
+    parts = arcs_between(x)[turns_between(x).max(axis=1) < STRAIGHT]
+    if not len(parts):
         return None
     length = parts.sum(axis=1)
     low, high = (float(v) for v in np.quantile(length, USUAL))
@@ -47,9 +49,14 @@ def stretching(s: Seen, order: tuple[int, ...]) -> Stretch | None:
 def arcs_between(x: Array) -> Array:
     """(frames, markers - 1) m, along a rope from each of its markers (frames, markers, 3) to the next: an arc of length
     l that turns by theta is longer than its chord by l theta^2/24."""
-    links = np.diff(x, axis=1)
-    chords = np.linalg.norm(links, axis=2)
-    ways = links / chords[..., None]
-    turns = np.arccos(np.clip((ways[:, 1:] * ways[:, :-1]).sum(axis=2), -1.0, 1.0)) ** 2
+    chords = np.linalg.norm(np.diff(x, axis=1), axis=2)
+    turns = turns_between(x) ** 2
     inner = np.concatenate([turns[:, :1], 0.5 * (turns[:, 1:] + turns[:, :-1]), turns[:, -1:]], axis=1)
     return np.asarray(chords * (1.0 + inner / 24.0))
+
+
+def turns_between(x: Array) -> Array:
+    """(frames, markers - 2) rad, by which a line through markers (frames, markers, 3) turns at each inner one."""
+    links = np.diff(x, axis=1)
+    ways = links / np.linalg.norm(links, axis=2, keepdims=True)
+    return np.asarray(np.arccos(np.clip((ways[:, 1:] * ways[:, :-1]).sum(axis=2), -1.0, 1.0)))
