@@ -35,7 +35,7 @@ def stretching(s: Seen, order: tuple[int, ...]) -> Stretch | None:
         return None
     x = s.recording.positions[:, list(order)]
     x = x[np.isfinite(x).all(axis=(1, 2))]
-    if not len(x) or np.ptp(x, axis=(0, 1)).min() == 0.0:  # one camera, to which a rope that swings in depth gets shorter
+    if not len(x) or np.ptp(x, axis=(0, 1)).min() == 0.0:  # one camera sees no depth
         return None
     parts = arcs_between(x)[turns_between(x).max(axis=1) < STRAIGHT]
     if not len(parts):
