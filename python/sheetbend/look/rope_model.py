@@ -129,7 +129,7 @@ def model_of(
     """
     takes, found = [own.take for own in marked], marked[0].held
     s = takes[0].seen
-    stretch = None if table is not None else stretching(s, found.order)
+    stretch = None if table is not None or free_end(found) is None else stretching(s, found.order)
     if stretch is not None:
         marked = [_unloaded(own, stretch) for own in marked]
     length = _length(s, max(marked, key=lambda own: float(own.arcs[-1])), measured, stretch)
