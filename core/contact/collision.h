@@ -82,8 +82,8 @@ Surface<S> sphere_around(const BallPair<S>& p, bool rests) {
   return s;
 }
 
-// Of the inverse mass of two balls, what joints must leave of it. Where they link the two and leave less, it is them that end the approach: what is left of it
-// breaks them by a little, as sweeps and long substeps do, and a push that reverses it would be far larger than what does so.
+// The share of the inverse mass of two balls that joints must leave; with less, the push counts the masses alone. Joints that link the two and leave less than
+// a fifth end the approach themselves. What sweeps and long substeps leave of the approach is an error of these joints, which no push should reverse.
 inline constexpr double least_yielding = 1e-9, least_yielding_of_linked = 0.2;
 
 // Deeper than this share of their radii together, overlapping balls hit each other: rounding is no impact.

@@ -15,7 +15,7 @@ constexpr int at_row = sheetbend_blocks::row;
 constexpr double gives_way = 1e-10;     // D of a row that does, of J W J^T
 constexpr double softening = 1e-5;      // S, of J diag(K)^-1 J^T
 constexpr std::size_t few = 256;        // rows whose order is kept, as a border of H does (condensed.h)
-constexpr double far_less = 10.0;       // times: a row in a sum
+constexpr double far_less = 10.0;       // ratio of shares from which a row is exchanged
 constexpr double no_stiffness = 1e150;  // a of a member that has been taken out: products with zero stay zero
 
 // A member's numbers as its kind wants them.

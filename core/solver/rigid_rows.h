@@ -8,7 +8,7 @@
 // has the same pattern, and K need not be positive definite where rows hold. What S adds is taken back by passes on the rows' residual alone, each of
 // which leaves about (S - D)/(J K^-1 J^T) of it.
 //
-// Rows that others say already are left out, with multipliers of zero: those whose pivot in J W J^T is rounding at the state that the substep starts from.
+// Rows that follow from others are left out, with multipliers of zero: those whose pivot in J W J^T is too small at the state that the substep starts from.
 #pragma once
 
 #include <cmath>

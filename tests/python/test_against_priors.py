@@ -32,15 +32,15 @@ def test_a_prior_that_the_data_contradict_is_named() -> None:
     EI = found["rope_EI"]
     assert EI.value == pytest.approx(2.4e-3, rel=2e-3) and found.misfit.reduced_chi_square < 1.1
     (words,) = found.warnings
-    assert words.startswith("the data alone ask for rope_EI = 0.002399") and "3.6 standard deviations" in words
-    assert "its prior (0.002 N m^2, sd 5 %)" in words and EI.verdict == "identified"
+    assert words.startswith("the data alone give rope_EI = 0.002399") and "3.6 standard deviations" in words
+    assert "contradicts its prior (0.002 N m^2, sd 5 %)" in words and EI.verdict == "identified"
 
 
 def test_what_such_a_prior_moves_out_of_its_interval_is_doubtful() -> None:
     """The prior pulls the estimate off what the data ask for."""
     found = fitted(0.06, 2e-3)
     EI = found["rope_EI"]
-    assert EI.verdict == "doubtful" and "the data alone ask for rope_EI = 0.002" in EI.words
+    assert EI.verdict == "doubtful" and "the data alone give rope_EI = 0.002" in EI.words
 
 
 def test_a_right_prior_and_one_that_the_data_hardly_narrow_are_not() -> None:

@@ -1,10 +1,10 @@
 """Priors that the data contradict.
 
-A density that is told wrong leaves no trace in the residuals beside a fitted stiffness, since the two trade exactly. A
-prior of the stiffness, from another experiment, is all that can tell.
+A wrong density that is given leaves no trace in the residuals beside a fitted stiffness, because the stiffness
+compensates for it exactly. Only a prior of the stiffness, from another experiment, can show the error.
 
 With its mean m and standard deviation s, and the share h of an estimate u that comes from the prior (its
-leverage; the rest comes from the data), the data alone ask for x = m + (u - m)/(1 - h). Where both are right, u - m has
+leverage; the rest comes from the data), the data alone give x = m + (u - m)/(1 - h). Where both are right, u - m has
 the variance (1 - 2 h) s^2 + v. Here v is the variance of u, with correlated noise and errors of given values included;
 for white noise alone it is h s^2.
 """
@@ -56,10 +56,10 @@ def against_priors(problem: FitProblem, u: Array, judged: Identifiability) -> tu
         data = sd / (1.0 - share)
         step, width = data * r[row] * share, data * NORMAL * math.sqrt(variance - share**2)
         words = (
-            f"the data alone ask for {name} = {value_words(p, u[k], step, width)}, which its prior ({_words(p)}) "
-            f"contradicts: {short(score, 2)} standard deviations"
+            f"the data alone give {name} = {value_words(p, u[k], step, width)}, which contradicts its prior "
+            f"({_words(p)}): {short(score, 2)} standard deviations"
         )
-        warnings.append(f"{words}. Check the prior, and the given values with which {name} trades")
+        warnings.append(f"{words}. Check the prior, and the given values that can compensate for {name}")
         steps = -solved(np.delete(J, row, axis=0), np.delete(r, row))
         doubts |= {other: words for other, step, own in zip(names, steps, reach, strict=True) if abs(step) > own}
     return tuple(warnings), doubts
