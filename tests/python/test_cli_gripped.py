@@ -103,6 +103,7 @@ class TestFit:
         self.written(Path("out") / "ropes", rope)
         for words in (
             "start at a bending length",
+            "prediction: a recording that was not fitted is missed by",
             "What trades against what",
             "EA: not fitted",
             "the fit that counts",

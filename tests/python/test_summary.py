@@ -118,6 +118,8 @@ def test_a_prediction_that_is_worse_than_none_is_said(good: FitResult) -> None:
 def test_nothing_held_out_is_said(good: FitResult) -> None:
     seen = replace(good, recordings=(replace(good.recordings[0], held_out=None, baseline=None),))
     assert told(seen)["prediction"] == "not tested, because nothing was held out" and "`held_out`" in told(seen)["next"]
+    elsewhere = told(replace(seen, prediction="2 recordings that were not fitted are missed by 0.8 mm"))
+    assert elsewhere["prediction"].endswith("missed by 0.8 mm") and "`held_out`" not in elsewhere["next"]
 
 
 @pytest.mark.parametrize(

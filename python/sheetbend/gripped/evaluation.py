@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays.checks import check_kind
+from ..quantities.wording import short
 from ..recording.recording import Recording
 from ..report.scores import Scores, scores
 from .model import NAME
@@ -34,6 +35,19 @@ class Evaluation:
     scores: Scores | None
     diverged: tuple[str, ...]
     notes: tuple[str, ...] = ()
+
+    @property
+    def words(self) -> str:
+        """The mean errors in one sentence, for the summary of a report; empty where nothing was predicted."""
+        if self.scores is None:
+            return ""
+        count = len(self.scores.rows)
+        those = "a recording that was not fitted is" if count == 1 else f"{count} recordings that were not fitted are"
+        words = f"{those} missed by {short(1e3 * self.scores.error)} mm (mean absolute coordinate error)"
+        blend, it = self.scores.blend, "it" if count == 1 else "them"
+        return (
+            words if blend is None else f"{words}; a prediction without physics misses {it} by {short(1e3 * blend)} mm"
+        )
 
 
 def evaluate(found: RopeFit, recordings: Sequence[Recording | GrippedMotion]) -> Evaluation:

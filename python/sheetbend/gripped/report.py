@@ -49,7 +49,8 @@ class RopeReport:
             for name in (part.diverged if part is not None else ())
         )
         notes = tuple(f"unseen recording {note}" for note in (self.unseen.notes if self.unseen is not None else ()))
-        return replace(result, warnings=(*result.warnings, *self.found.warnings, *notes, *more))
+        words = self.unseen.words if self.unseen is not None else ""
+        return replace(result, prediction=words, warnings=(*result.warnings, *self.found.warnings, *notes, *more))
 
     def plain(self) -> str:
         """As plain text."""

@@ -87,7 +87,7 @@ def _held_out(result: FitData) -> dict[str, RecordingFit | ForceFit]:
 def _prediction(result: FitData) -> str:
     held = [*_held_out(result).values()]
     if not held:
-        return "not tested, because nothing was held out"
+        return result.prediction or "not tested, because nothing was held out"
     words = f"data that were not fitted are missed by {_span(held, lambda r: r.held_out)} (rms)"
     without = _span(held, lambda r: r.baseline)
     return f"{words}; a prediction without physics misses them by {without}" if without else words
@@ -114,7 +114,7 @@ def _steps(result: FitData) -> Iterator[str]:
     """What to do, the most urgent first."""
     first = [*_before_use(result)]
     yield from first
-    if not _held_out(result):
+    if not _held_out(result) and not result.prediction:
         yield "hold out a part of the data (`held_out`), to see how well the model predicts"
     if not first:
         yield "use the values with their intervals" + (", after you have read the warnings" if result.warnings else "")

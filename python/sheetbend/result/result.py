@@ -84,6 +84,7 @@ class FitData:
         recordings: errors per recording.
         baseline: what the no-physics baseline predicts, in words.
         held_out_is: what was held out, in words, where it is not a part of each recording.
+        prediction: how well recordings that are not among `recordings` are predicted, in words.
         cost: half the sum of squared residuals, priors included.
         first_cost: that of the best start's first point; None where the motion diverges there.
         jacobian_seconds: what one Jacobian took at the end; None where none was made from Python.
@@ -130,6 +131,7 @@ class FitData:
     gauges: tuple[str, ...] = ()
     baseline: str = ""
     held_out_is: str = ""
+    prediction: str = ""
     autocorrelation_time: float = 1.0
     starts: tuple[Start, ...] = ()
     refits: tuple[Refit, ...] = ()
