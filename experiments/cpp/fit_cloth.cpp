@@ -14,8 +14,7 @@ sheetbend::Observations read_table(const char* path) {
   std::ifstream file(path);
   std::string line, cell;
   if (!std::getline(file, line) || !line.starts_with("time,"))
-    throw sheetbend::InputError(path, "cannot be read or has no header",
-                                "give a table that begins with time,12_x,12_y,12_z");
+    throw sheetbend::InputError(path, "has no header", "begin the table with time,12_x,12_y,12_z");
   std::istringstream header(line);
   for (int column = 0; std::getline(header, cell, ','); ++column)
     if (column % 3 == 1) observed.markers.push_back(sheetbend::Marker::on(std::stoi(cell)));
@@ -45,7 +44,6 @@ int main(int count, char** arguments) {
     ceres::Problem problem;  // owns the residuals
     problem.AddResidualBlock(residuals, nullptr, blocks);
     ceres::Solver::Options options;
-    // To the last digits.
     options.function_tolerance = options.gradient_tolerance = options.parameter_tolerance = 1e-16;
     ceres::Solver::Summary summary;
     ceres::Solve(options, &problem, &summary);

@@ -98,7 +98,7 @@ def build_scene(
     if section.pin:
         scene.pin([particles.find("scene.pin", r) for r in section.pin])
     for _, rope in section.strands:
-        if rope.points == "recording" and rope.name in scene.ropes:
+        if rope.points == "recording" and rope.EA is None and rope.name in scene.ropes:
             follow_length(scene, scene.ropes[rope.name])
     return scene, particles
 

@@ -81,14 +81,18 @@ def wrong_given(
     ok, r, J = problem.evaluate_exactly(u)
     if not ok or not np.isfinite(J).all():
         return []
-    J = problem.parameters.inside(u) * J
-    lacking = Lacking(problem, u)
+    inside, lacking = problem.parameters.inside(u), Lacking(problem, u)
+    # A parameter at a limit cannot absorb residuals beyond it, but it can move back from it. So both are asked.
+    ways = [inside * J] if inside.all() else [inside * J, J]
 
     def asked(driven: Array | None = None) -> list[Wrong]:
-        found = _asked(problem, u, r, J, told, lacking, driven=driven)
-        if found and refinement is not None and (shifts := residual_shifts(problem, u, refinement)):
-            found = _asked(problem, u, r, J, told, lacking, np.column_stack(shifts), driven)
-        return found
+        for way in ways:
+            found = _asked(problem, u, r, way, told, lacking, driven=driven)
+            if found and refinement is not None and (shifts := residual_shifts(problem, u, refinement)):
+                found = _asked(problem, u, r, way, told, lacking, np.column_stack(shifts), driven)
+            if found:
+                return found
+        return []
 
     found = [one if one.sure or one.times <= FAR else followed(problem, u, one) for one in asked()]
     if problem.estimates_corrections:

@@ -57,7 +57,7 @@ def table(section: Section) -> dict[str, Any]:
 
 def _coded(escaped: Any) -> Any:
     """What stands between grave accents as code, in escaped text."""
-    return type(escaped)(re.sub(r"`([^`]+)`", r"<code>\1</code>", escaped))
+    return type(escaped)(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escaped)))
 
 
 def _asset(name: str) -> str:

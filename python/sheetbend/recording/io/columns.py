@@ -55,7 +55,7 @@ def coordinates(header: Sequence[str], own: Sequence[int]) -> tuple[list[int], l
     whole = names and all(_marker_of(names[k : k + 3], 3) is not None for k in range(0, len(names), 3))
     if not whole or {header[k].lower() for k in own} >= _TURNS:
         return list(own), []
-    return places, [header[k] for k in own if k not in places]
+    return places, [header[k] for k in sorted({*own} - {*places})]
 
 
 def _is_coordinate(name: str) -> bool:
