@@ -83,13 +83,14 @@ def wrong_given(
         return []
     inside, lacking = problem.parameters.inside(u), Lacking(problem, u)
     # A parameter at a limit cannot absorb residuals beyond it, but it can move back from it. So both are asked.
-    ways = [inside * J] if inside.all() else [inside * J, J]
+    ways = [J] if inside.all() else [inside * J, J]
+    shifts = cache(lambda: residual_shifts(problem, u, refinement) if refinement is not None else [])
 
     def asked(driven: Array | None = None) -> list[Wrong]:
         for way in ways:
             found = _asked(problem, u, r, way, told, lacking, driven=driven)
-            if found and refinement is not None and (shifts := residual_shifts(problem, u, refinement)):
-                found = _asked(problem, u, r, way, told, lacking, np.column_stack(shifts), driven)
+            if found and shifts():
+                found = _asked(problem, u, r, way, told, lacking, np.column_stack(shifts()), driven)
             if found:
                 return found
         return []
