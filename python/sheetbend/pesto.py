@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from .arrays.types import Array
 from .errors import InputError, SheetbendError
 from .experiment.experiment import Experiment
 from .experiment.wanted import ParameterLike, as_parameters
@@ -24,7 +25,6 @@ from .quantities.parameters import Parameter, Parameters
 from .recording.recording import Recording
 from .scene.scene import Scene
 
-Array = np.ndarray
 FAR = 1e3  # a factor, or natural scales: bounds about the initial value of a parameter that has none
 
 

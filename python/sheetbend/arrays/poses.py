@@ -8,8 +8,7 @@ from numpy.typing import ArrayLike
 from ..errors import SceneError
 from .checks import check_increasing, finite
 from .rotations import continuous, unit_quaternions
-
-Array = np.ndarray
+from .types import Array
 
 
 def checked_poses(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import SceneError
+from .types import Array
 
-Array = np.ndarray
 FEWEST = 3  # markers, not on one line, that tell a rotation
 LOOSE = 0.2  # of the least distance of two markers: some that move so much against each other sit on no rigid piece
 FLAT = 0.02  # of the widest extent of a body: markers that spread less across their line do not tell its roll

@@ -7,8 +7,8 @@ from numpy.typing import ArrayLike
 
 from ..errors import SceneError
 from .checks import finite
+from .types import Array
 
-Array = np.ndarray
 ROUNDING = 1e-6  # of a matrix that was printed with six digits
 
 

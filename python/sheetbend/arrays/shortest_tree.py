@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .timeseries import Array
+from .types import Array
 
 
 def tree(apart: Array, markers: tuple[int, ...]) -> tuple[dict[int, set[int]], float]:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-Array = np.ndarray
+from .types import Array
+
 FEWEST = 5  # frames that a parabola is fitted to
 WIDER = (2.0, 2.8, 4.0, 5.6, 8.0)  # times a width: longer ones, in which a polynomial of degree 4 replaces a parabola
 

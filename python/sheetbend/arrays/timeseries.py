@@ -7,7 +7,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from .types import Array
+
 Kind = Literal["linear", "cubic"]
 KINDS: tuple[Kind, ...] = ("linear", "cubic")
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import InputError
 from ..files.whole import written
 from ..quantities.wording import short

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays.smoothing import smoothed
+from ..arrays.types import Array
 from ..errors import ConfigError
 from ..objects.grip import Grip
 from ..objects.rope import Rope
@@ -19,8 +20,6 @@ from .bodies import named_body
 from .errors import located
 from .moment import Moment
 from .tools import tool_named
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)

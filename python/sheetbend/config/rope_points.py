@@ -8,11 +8,11 @@ import numpy as np
 
 from ..arrays.smoothing import state_at
 from ..arrays.timeseries import interpolate
+from ..arrays.types import Array
 from ..errors import ConfigError
 from .moment import Moment
 from .rope_schema import Rod, Rope
 
-Array = np.ndarray
 Seats = Sequence[tuple[float | None, int]]
 """Markers on a rope, in order along it: the arc length (None where they are equally spaced from end to end), and the
 marker's number."""

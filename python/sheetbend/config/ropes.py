@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import ConfigError
 from ..objects.chain import straight_way
 from ..objects.grip import Grip
@@ -20,7 +21,7 @@ from . import rope_schema as schema
 from .errors import located
 from .grips import Led, end_on_body, held_end, hold_led, place_of
 from .moment import Moment
-from .rope_points import Array, Seats, curve, through_markers
+from .rope_points import Seats, curve, through_markers
 
 _ELSEWHERE = {
     *("name", "pinned", "points", "segments", "velocity", "smoothing", "markers", "grip"),

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import SheetbendError
 from ..experiment.experiment import Experiment
 from ..experiment.found_start import start_nodes

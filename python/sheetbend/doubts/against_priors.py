@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..minimum.problem import FitProblem
 from ..minimum.smooth import modes_of_fields
 from ..optional import require

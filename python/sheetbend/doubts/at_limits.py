@@ -11,12 +11,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..experiment.experiment import Experiment
 from ..experiment.force_sensor import AXES
 from ..quantities.wording import short
 from ..statistics.white_noise import white_variance
 
-Array = np.ndarray
 LEAST = 3  # equal readings in a row
 LONGER = 2.0  # times as long as any other row of equal readings: a log may repeat each reading
 CHANCE = 1e-6  # of such a row by noise, where readings are rounded

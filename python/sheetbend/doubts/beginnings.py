@@ -24,7 +24,7 @@ from functools import cache
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import SheetbendError
 from ..minimum.discretization import Refinement
 from ..minimum.growth import Growth

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
 from ..result.estimate import Estimate

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.checks import MOST_WHOLE, check_count
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import InputError
 from ..minimum.linear_step import gauss_newton
 from ..minimum.problem import FitProblem

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..optional import require
 from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.layout import Layout

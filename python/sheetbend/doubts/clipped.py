@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import SheetbendError
 from ..minimum.problem import FitProblem
 from ..optional import require

@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import SceneError, SheetbendError
 from ..mesh import TriangleMesh
 from ..minimum.problem import FitProblem

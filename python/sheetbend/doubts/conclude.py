@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..experiment.wanted import quantities_of
 from ..minimum.growth import Growth
 from ..minimum.linear_step import gauss_newton

@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays.timeseries import Array, mean_position
+from ..arrays.timeseries import mean_position
+from ..arrays.types import Array
 from ..experiment.cut import start_quantities
 from ..experiment.experiment import Experiment
 from ..minimum.discretization import Refinement

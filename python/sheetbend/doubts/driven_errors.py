@@ -27,7 +27,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ..arrays.timeseries import Array, interpolate, noise, off_neighbors
+from ..arrays.timeseries import interpolate, noise, off_neighbors
+from ..arrays.types import Array
 from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
 from ..scene.boundary import Following

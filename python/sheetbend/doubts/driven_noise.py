@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
 from ..result.estimate import Estimate
@@ -22,7 +23,6 @@ from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of
 from .driven_errors import DIRECTIONS, DrivenErrors, drawn_noise
 
-Array = np.ndarray
 UNFELT = 1e-9  # of the largest column of J: a parameter that moves less is not drawn off
 HARMLESS = 0.25  # of the residual: then a sixteenth of its variance is the driven markers'
 DISHONEST = 1.5  # times what a sigma says

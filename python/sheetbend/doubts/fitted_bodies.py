@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..minimum.problem import FitProblem
 from ..quantities.expression import numbers
 from ..scene.bodies import names_of

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..experiment.experiment import Experiment
 from ..experiment.force_sensor import CHANNELS
 from ..minimum.problem import FitProblem
 from ..result.motions import ForceFit
 
-Array = np.ndarray
 UNITS = (("N", slice(0, 3)), ("N m", slice(3, CHANNELS)))
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..arrays.checks import check_kind, is_number
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import InputError
 from ..minimum.problem import FitProblem
 from ..result.estimate import Premise

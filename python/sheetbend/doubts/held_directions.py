@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..objects.grip import any_across, carried
 from ..objects.rod import Rod
 from ..objects.rope import Rope

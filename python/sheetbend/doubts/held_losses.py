@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..experiment.wanted import quantities_of
 from ..minimum.problem import FitProblem
 from ..quantities.parameters import Parameter, Parameters

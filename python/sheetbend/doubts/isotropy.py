@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..objects.rod import Rod
 from ..quantities.wording import short
 from ..scene.scene import Scene

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cache, partial
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..minimum.problem import FitProblem
 from .clipped import clipped
 from .cloth_size import cloth_sizes

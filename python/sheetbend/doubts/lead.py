@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..objects.markers import Place
 from ..quantities.wording import short
 from ..scene.scene import Scene

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..minimum.problem import FitProblem
 from ..quantities.parameters import Parameters
 from ..quantities.wording import short
@@ -21,7 +22,6 @@ from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import NORMAL
 from ..statistics.least_squares import unexplained
 
-Array = np.ndarray
 LOSSES = (
     *("_damping", "_viscosity", "_loss_factor"),
     *("_drag", "_drag_linear", "_drag_quadratic", "_air_normal", "_air_tangential"),

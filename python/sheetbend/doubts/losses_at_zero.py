@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..experiment.experiment import Experiment
 from ..quantities.wording import short
 from ..scene.group import places_of_groups

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..minimum.discretization import Refinement
 from ..minimum.problem import FitProblem
 from ..statistics.least_squares import solved, unexplained

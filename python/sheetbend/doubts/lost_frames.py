@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
 from ..statistics.gauge import RANK_TOLERANCE

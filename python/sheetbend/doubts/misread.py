@@ -14,7 +14,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.timeseries import Array, mean_position
+from ..arrays.timeseries import mean_position
+from ..arrays.types import Array
 from ..errors import SheetbendError
 from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import SheetbendError
 from ..experiment.force_sensor import ForceSensor
 from ..minimum.problem import FitProblem

@@ -24,7 +24,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..experiment.cut import in_steps
 from ..minimum.discretization import Refinement
 from ..minimum.problem import FitProblem

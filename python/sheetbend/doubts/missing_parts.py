@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short

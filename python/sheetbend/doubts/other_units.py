@@ -11,10 +11,10 @@ from collections.abc import Container, Iterator
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..experiment.experiment import Experiment
 from ..quantities.wording import short
 
-Array = np.ndarray
 SLIPS = {
     10: "as if cm were given as mm, or mm as cm",
     100: "as if cm were given as m",

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..minimum.problem import FitProblem
 from ..objects.cloth import Cloth
 from ..quantities.wording import short

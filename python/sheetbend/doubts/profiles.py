@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import SheetbendError
 from ..minimum.coordinates import step_limits
 from ..minimum.counts import count, counted

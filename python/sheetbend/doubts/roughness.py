@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..experiment.cut import start_quantities
 from ..minimum.growth import Growth
 from ..minimum.problem import FitProblem

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import SheetbendError
 from ..experiment.force_sensor import ForceSensor
 from ..minimum.problem import FitProblem

@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import SheetbendError
 from ..minimum.problem import FitProblem
 from ..optional import require

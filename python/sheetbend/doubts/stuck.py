@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..minimum.problem import FitProblem
 from ..quantities.wording import quantity, side_words
 from ..result.estimate import Estimate

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import SheetbendError
 from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem

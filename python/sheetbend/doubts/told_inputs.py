@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..experiment.experiment import Experiment
 from ..quantities.wording import short
 from .held_directions import held_directions

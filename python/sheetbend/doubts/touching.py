@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import DivergenceError, SceneError, UnbalancedError
 from ..minimum.problem import FitProblem
 from ..motion.contact_counts import ContactMode

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..statistics.layout import Layout
 from ..statistics.least_squares import unexplained
 from .directions import asked_for

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..experiment.experiment import Experiment
 from ..minimum.approach import Approach
 from ..minimum.discretization import Refinement

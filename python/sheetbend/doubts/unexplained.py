@@ -21,7 +21,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.timeseries import Array, mean_position
+from ..arrays.timeseries import mean_position
+from ..arrays.types import Array
 from ..experiment.carried import Values, carried_baselines
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short

@@ -22,7 +22,7 @@ from functools import cache, partial
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..minimum.discretization import Refinement
 from ..minimum.lifted import Lifted
 from ..minimum.problem import FitProblem

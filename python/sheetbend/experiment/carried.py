@@ -12,7 +12,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..arrays.timeseries import Array, interpolate, mean_position
+from ..arrays.timeseries import interpolate, mean_position
+from ..arrays.types import Array
 from ..recording.recording import Recording
 from ..scene.scene import Scene
 from .experiment import Experiment

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import timeseries
+from ..arrays.types import Array
 from ..recording.recording import Recording
 
 if TYPE_CHECKING:
     from ..scene.boundary import Boundary
     from ..scene.scene import Scene
 
-Array = np.ndarray
 KNOTS_BEYOND = 3  # a cubic piece reaches two knots on, and the substep behind the last frame counts
 
 

@@ -9,12 +9,12 @@ import numpy as np
 
 from ..arrays.smoothing import FEWEST, steadiest
 from ..arrays.timeseries import interpolate, mean_position
+from ..arrays.types import Array
 from ..errors import RecordingError
 from ..recording.recording import Recording
 from .correction import Correction
 from .experiment import Experiment
 
-Array = np.ndarray
 SAME_TIME = 1e-6  # s
 WIDTHS = tuple(2.0 ** (k / 4) for k in range(4, 30))  # times that of the fewest frames
 FAR, PART = 10.0, 0.1

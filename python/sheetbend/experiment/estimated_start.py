@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import InputError
 from ..objects.markers import Place
 from ..objects.rod import Rod
@@ -23,7 +24,6 @@ from ..objects.stiffness_field import laplacian_of_triangles, modes_of_laplacian
 from ..recording.recording import Recording
 from ..scene.scene import Scene
 
-Array = np.ndarray
 LEAST = 0.01  # of the widest deviation: finer modes do not count
 LENGTHS = 0.5 ** np.arange(6)  # of a piece's extent: lengths of the prior that are tried
 SIZES = 1.5 ** np.arange(-6, 13)  # likewise, of the root mean square of what the markers show

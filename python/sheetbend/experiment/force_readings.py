@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from .. import _core
 from ..arrays.checks import finite
+from ..arrays.types import Array
 from ..errors import InputError
 from ..motion.core_terms import divergence
 from ..motion.solver import Solver
@@ -20,8 +21,6 @@ from ..scene.given import check_scene
 from ..scene.scene import Scene
 from .experiment import Experiment
 from .force_sensor import ForceSensor
-
-Array = np.ndarray
 
 
 def simulate_forces(

@@ -11,13 +11,13 @@ import numpy as np
 
 from ..arrays.checks import finite, is_number
 from ..arrays.rotations import rotated
+from ..arrays.types import Array
 from ..errors import InputError
 from ..quantities.quantities import Term, product
 from ..recording.force_recording import ForceRecording
 from ..scene.body import GROUND
 from ..scene.scene import Scene
 
-Array = np.ndarray
 INPUTS = 11
 """Numbers of a sensor in an experiment's inputs: biases of force and torque, mass and center of the tool, its clock."""
 CHANNELS = 6

@@ -7,11 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..motion.core_terms import divergence
 from ..motion.equilibrium import equilibrium
 from .experiment import Experiment
-
-Array = np.ndarray
 
 
 def started(e: Experiment, numbers: Array) -> Experiment:

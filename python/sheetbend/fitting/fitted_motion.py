@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..doubts.prediction import Comparison
 from ..experiment.driven_motion import corrected
 from ..experiment.found_start import start_nodes

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays.checks import MOST_WHOLE, check_count, check_kind, is_number
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..doubts.floors import solver_floors
 from ..doubts.roughness import rough_parameters
 from ..errors import InputError, SheetbendError

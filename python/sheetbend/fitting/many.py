@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..arrays.checks import MOST_WHOLE, check_count
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import InputError, SheetbendError
 from ..experiment.experiment import Experiment
 from ..experiment.wanted import ParameterLike, as_parameters

@@ -13,7 +13,8 @@ from itertools import permutations
 import numpy as np
 
 from ..arrays.shortest_tree import tree
-from ..arrays.timeseries import Array, mean_position
+from ..arrays.timeseries import mean_position
+from ..arrays.types import Array
 from ..errors import RecordingError
 from ..files.units import METERS
 from ..recording.recording import Recording

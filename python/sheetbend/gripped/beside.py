@@ -13,9 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import SheetbendError
 from .model import RopeModel
-from .motion import Array, GrippedMotion
+from .motion import GrippedMotion
 from .offsets import frames_at_markers
 from .slid import window_of
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import SheetbendError
 from ..experiment.experiment import Experiment
 from ..fitting.fit import Fit, fit
@@ -23,7 +24,7 @@ from .climb import Climb
 from .descent import bearable, descend, negligible
 from .ladder import TWIST, Rung
 from .model import NAME, RopeModel
-from .motion import Array, GrippedMotion
+from .motion import GrippedMotion
 from .offsets import offset_reach
 from .over_density import as_quantities
 from .own_rest import OwnRest, own_rest

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..minimum.approach import Approach
 from ..minimum.problem import FitProblem
 from ..minimum.slope import ROUNDING, STUCK

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays.timeseries import Array, mean_position
+from ..arrays.timeseries import mean_position
+from ..arrays.types import Array
 
 LONG = 0.95  # quantile over frames of a distance: the length of a link, which is as long when the rope is straight
 SHORTER = 0.98  # mean distance to the outer marker over that to the inner one, from which on an order is in question

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays.checks import check_kind
+from ..arrays.types import Array
 from ..quantities.wording import short
 from ..recording.recording import Recording
 from ..report.scores import Scores, scores
 from .model import NAME
-from .motion import Array, GrippedMotion
+from .motion import GrippedMotion
 from .recipe import RopeFit
 from .screening import screened
 from .slips import slips, slips_said

@@ -12,12 +12,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..minimum.approach import RIDGE, inside
 from ..minimum.coordinates import step_limits
 from ..minimum.problem import FitProblem
 from .judging import Errors, Split, Verdict, verdict
 from .model import RopeModel
-from .motion import Array
 from .pieces import numbered, problem_of
 from .slid import window_of
 

@@ -13,11 +13,12 @@ from math import comb
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import SheetbendError
 from .beside import beside
 from .ladder import TWIST
 from .model import NAME, RopeModel
-from .motion import Array, GrippedMotion
+from .motion import GrippedMotion
 from .pieces import numbered, problem_of
 from .slid import window_of
 from .split import split

@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.timeseries import stretches
+from ..arrays.types import Array
 from ..recording.recording import Recording
-
-Array = NDArray[np.float64]
 
 REPEATS = 5  # frames in a row, from which on it is frozen tracking or a file that was made from fewer frames
 MOVES = 2e-3  # m, that a marker goes at least before or after a repeated frame: of a rope at rest frames may be equal

@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.timeseries import mean_position, stretches
+from ..arrays.types import Array
 from ..recording.leaps import elsewhere, leaps, least_leap
 from ..recording.recording import Recording
 from ..recording.relabeled import put_back
 from .end_links import EndLink, end_link
 from .lost_frames import on_time
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 TURNED = -0.5  # cosine of the angle by which two neighbors turn from frame to frame when they are exchanged

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import InputError
 from ..experiment.experiment import Experiment
 from ..motion.solver import Solver
@@ -17,7 +18,7 @@ from ..quantities.quantities import product
 from ..recording.recording import Recording
 from ..recording.windows import Window
 from ..scene.scene import Scene
-from .motion import Array, GrippedMotion
+from .motion import GrippedMotion
 from .rolls import add_rolls
 
 NAME = "rope"

@@ -10,13 +10,13 @@ import numpy as np
 from ..arrays import timeseries
 from ..arrays.smoothing import LocalFit, smoothed, steadiest
 from ..arrays.timeseries import mean_position
+from ..arrays.types import Array
 from ..errors import RecordingError
 from ..objects.grip import Grip
 from ..optional import require
 from ..recording.recording import Recording
 from .order import check_order
 
-Array = np.ndarray
 POLYLINE = 200  # points of the initial curve, which links are laid along
 BRIDGED = 0.1  # s, of a gap: there the C1 cubic stands in for what was not seen, of grips and of starts
 

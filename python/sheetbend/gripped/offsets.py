@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
 from ..motion.simulate import simulate
@@ -20,7 +21,6 @@ from ..objects.rod import Rod
 from ..optional import require
 from ..recording.recording import Recording
 from .model import NAME
-from .motion import Array
 
 
 def offset_reach(problem: FitProblem, u: Array, beside: Sequence[tuple[float, float]] = ()) -> dict[str, float]:

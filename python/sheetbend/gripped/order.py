@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays.timeseries import Array, mean_position
+from ..arrays.timeseries import mean_position
+from ..arrays.types import Array
 from ..errors import RecordingError
 from ..recording.recording import Recording
 from .end_links import end_link

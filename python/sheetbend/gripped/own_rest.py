@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
 from .model import NAME
-from .motion import Array
 
 FEWEST = 6  # windows
 ALIKE = 10.0  # neighboring residuals that count as one

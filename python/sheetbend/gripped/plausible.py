@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..arrays.types import Array
 from .model import GRAVITY
-from .motion import Array, GrippedMotion
+from .motion import GrippedMotion
 
 SAGS = 0.05  # of the length: less has no direction
 FAST = 2.0  # mean squared speed over g times the length

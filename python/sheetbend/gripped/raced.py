@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..minimum.problem import FitProblem
 from ..minimum.race import Course, Raced, race
 from ..minimum.starts import drawn, off_bounds

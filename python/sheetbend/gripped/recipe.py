@@ -17,6 +17,7 @@ from typing import Literal
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import is_list, is_number
+from ..arrays.types import Array
 from ..errors import InputError
 from ..fitting.fit import Fit
 from ..minimum.journal import journaled
@@ -30,7 +31,7 @@ from .conclusion import announced, conclude
 from .judging import predict
 from .ladder import LADDER, Rung
 from .model import NAME, RopeModel, nominal_directions
-from .motion import Array, GrippedMotion, motions_of
+from .motion import GrippedMotion, motions_of
 from .over_density import UNIT, as_quantities, named_over_density, over_density, said_over_density
 from .plausible import doubts
 from .read import Read, read

@@ -11,9 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..experiment.experiment import Experiment
 from .model import RopeModel
-from .motion import Array, GrippedMotion
+from .motion import GrippedMotion
 
 RESTS = 2.0  # mean square of slopes and bends of the first frames over that of noise, below which a rope rests
 SECONDS, THICK = 0.6, 12.0  # s, of the creep, and 1/s, its drag over the density: about that of no overshoot

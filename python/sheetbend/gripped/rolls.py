@@ -12,12 +12,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..objects.grip import Grip, any_across
 from ..objects.grip_freedom import add_motion, axes_of
 from ..objects.rod import Rod
 from ..objects.rod_end import spread_turn
 from ..scene.scene import Scene
-from .motion import Array, GrippedMotion
+from .motion import GrippedMotion
 
 # Of u, v, u^2, u v and v^2: of the angle's tangent, as no roll is near 90 degrees.
 ORDERS = ("1", "2", "11", "12", "22")

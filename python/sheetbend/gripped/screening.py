@@ -18,12 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.checks import is_list
+from ..arrays.types import Array
 from ..errors import InputError, RecordingError
 from ..recording.recording import Recording
 from .alike import FEWEST, alike
 from .end_links import usual_links
 from .mend import mended, steadied_order
-from .motion import Array, GrippedMotion, gripped_ends
+from .motion import GrippedMotion, gripped_ends
 from .plausible import sag_axis
 from .stretch import longest_stretch
 

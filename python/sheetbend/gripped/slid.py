@@ -17,12 +17,13 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ..arrays.smoothing import FEWEST
+from ..arrays.types import Array
 from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
 from ..quantities.parameters import Parameter, Parameters
 from ..recording.windows import Window
 from .model import NAME, RopeModel
-from .motion import Array, GrippedMotion
+from .motion import GrippedMotion
 from .rest import creep, rests
 
 MODES = tuple(range(6))

@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..quantities.wording import short
 from ..statistics.least_squares import unexplained
-from .motion import Array, GrippedMotion, chords_of, fractions_of
+from .motion import GrippedMotion, chords_of, fractions_of
 
 LEAST = 1e-3  # m, that a slip is told from
 CLEAR = 0.7  # of the variance that a jump explains, from which on it is one

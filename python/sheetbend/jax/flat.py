@@ -6,11 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..motion.inputs_of_quantities import InputsOfQuantities
 from ..motion.rollouts import Rollouts
 from ..scene.compiled import CompiledScene
-
-Array = np.ndarray
 
 
 class FlatInputs:

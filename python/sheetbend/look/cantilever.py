@@ -15,13 +15,13 @@ import numpy as np
 
 from ..arrays.rigid import rigid_motion
 from ..arrays.timeseries import default_max_gap, interpolate, mean_position
+from ..arrays.types import Array
 from ..recording.oscillation import along, dominant_direction, first_frequency
 from .line import snapped
 from .seen import Seen
 from .take import Description, Measured, Take
 from .text import joined, table
 
-Array = np.ndarray
 FIRST_MODE = 1.8751**4
 FITTED, PREDICTED = 3.0, 8.0  # periods
 AT_REST = 0.05  # of the first amplitude: how little the end moves in the last fifth, to count as a shape at rest

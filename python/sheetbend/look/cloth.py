@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import RecordingError
 from . import robot
 from .beginning import lets_go
@@ -21,7 +22,6 @@ from .take import Description, Measured, Take, max_gap
 from .text import joined, table
 from .unseen import Freed, freed, moves_first
 
-Array = np.ndarray
 CELLS = 10  # along the longer side
 WHOLE = 0.8  # share of the markers that must hang together as one sheet
 WARP, SHEAR = 500.0, 100.0  # N/m per kg/m^2, to start from

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from ..arrays.timeseries import default_max_gap
+from ..arrays.types import Array
 from .margin import HALF, Edge, Margin, margin
 from .seen import Seen
 from .sheet import laid, spacing
 
-Array = np.ndarray
 QUIET = 0.1  # of the motion of all: how little a row moves where the edge beyond it is held
 STAYS = 0.3  # of the motion of all, and of any other side: how little the row moves that is next to a held edge
 SAGS = 0.03  # of its length: by so much a row of markers hangs below its ends where only these are held

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..arrays.types import Array
 from .held import gripping
 from .seen import FEWEST_OF_SHEET, Seen
 from .sheet import components, spacing
 
-Array = np.ndarray
 EVEN = 0.1  # of the spacing: how much the distances of neighbors in rows and columns vary
 FEW = 0.2  # of the markers, that have no neighbor at the spacing of all others
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import RecordingError
 from . import robot
 from .cloth_held import SAGS, SIDES, Hold, holds, row_of, share, slung
@@ -19,7 +20,6 @@ from .slung import Slack, slack
 from .take import Measured
 from .text import joined
 
-Array = np.ndarray
 ASKEW = 0.15  # slope at which a cloth hangs that a wind blows on
 AIR = 0.7  # kg/m^3, of a plate across the wind: half the density of air times a drag coefficient of 1.2
 PLANE = 1.5  # times the noise, by which markers are off a plane at most that a cloth starts in

@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays.smoothing import smoothed
+from ..arrays.types import Array
 from .held import Held
 from .seen import REST, Seen, motion_of
 
-Array = np.ndarray
 FEWEST, FRAMES = 5, 20  # markers on the rope, and frames in which all are seen, at least
 MOVES = 0.3  # m/s^2, root mean square across the rope, at least: less is hidden by noise
 COUNTS = 0.05  # of the mass of the rope: a smaller one cannot be told from markers and stiffness

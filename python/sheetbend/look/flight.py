@@ -10,12 +10,12 @@ import numpy as np
 
 from ..arrays.rigid import rigid_motion
 from ..arrays.rotations import quaternions_of
+from ..arrays.types import Array
 from ..recording.of_poses import start_of_poses
 from .seen import Seen
 from .take import Description, Measured, Take
 from .text import joined, table
 
-Array = np.ndarray
 FEWEST = 9  # frames of a flight, and of a window in which it is looked for
 WIDTH = 0.04  # s of such a window, at least
 ALLOWED = 0.1  # of what gravity alone does in a window: how little a flight leaves of it

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..arrays.types import Array
 from .cloth_held import row_of
 from .seen import Seen
 from .sheet import spacing
 
-Array = np.ndarray
 NEAR = 3.0  # spacings between the upper rows of both, at most
 VARIES = 0.1  # of this distance: its standard deviation over time at most
 PARALLEL = 0.9  # cosine of the angle between both rows, at least

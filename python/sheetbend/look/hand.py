@@ -8,10 +8,10 @@ from itertools import pairwise
 import numpy as np
 
 from ..arrays.rigid import rigid_motion
+from ..arrays.types import Array
 from .line import tangent
 from .seen import Seen
 
-Array = np.ndarray
 RIDES = 3.0  # times the noise: a marker that moves less in the hand's own axes rides on the hand
 LEADS = np.geomspace(0.1, 6.0, 150)  # that are looked for, in distances between the first two markers
 LAYERS = np.geomspace(1e-3, 1.0, 80)  # bent stretches that are looked for, in lengths of the rope

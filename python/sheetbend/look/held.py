@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from ..arrays.timeseries import mean_position
+from ..arrays.types import Array
 from .hand import LEAD_SD, SHIFT_SD, TILT_SD, entry
 from .line import chain, plane, snapped, tangent
 from .seen import CALM, Seen, fixtures, motion_of
 from .text import joined
 
-Array = np.ndarray
 NAMES = ("hand", "grip", "wrist", "clamp", "vise", "fixture", "robot", "holder", "finger")
 SMOOTHING, ALONE = 0.06, 0.12  # s, of recorded grips; of one that has one marker
 DRAGS = 0.2  # s, of a hand that drags a rope over a table: friction keeps how its noise turns the rope

@@ -11,9 +11,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..arrays.types import Array
 from .margin import pitches
 
-Array = np.ndarray
 OPEN = 0.75  # of the distances across one gap are smaller than it: the others are bent, or shorter by noise
 LONGER = 1.2  # times that over the fabric: how long a distance is at most, in a fabric that shears
 EVEN = 0.05  # of a gap: how much the distances across it vary, in the median

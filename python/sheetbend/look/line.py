@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 
 from ..arrays.shortest_tree import tree
+from ..arrays.types import Array
 
-Array = np.ndarray
 SHORTER = 0.9  # of the length through the markers in the file's order: another order counts only if it is so short
 TURNED = 0.8  # of the way over three neighbors: how far apart the outer ones are where a line turns by 74 degrees
 AXIS, FLAT = 0.97, 0.02  # cosine of the angle to an axis that is taken for it; share of a length that is flat

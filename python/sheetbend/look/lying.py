@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..arrays.types import Array
 from .falls import falls
 from .held import BEYOND, gripping, parts
 from .line import plane
 from .seen import Seen
 
-Array = np.ndarray
 BAND = 0.01  # of the length: how high above the lowest markers counts as lying, and six times the noise at least
 SHARE = 0.6  # of all that is seen, so low
 SLIDES = 3.0  # times this band: how far markers move along the floor

@@ -13,7 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-Array = np.ndarray
+from ..arrays.types import Array
+
 HALF = 0.5  # of the distance between rows: how far a cloth goes on where nothing tells it
 FEWEST, ROWS = 3, 4  # markers of a column, at least and at most, through which a parabola goes
 LEAST, MOST, STEP = -0.3, 1.5, 0.1  # of the distance between rows, where the edge is looked for

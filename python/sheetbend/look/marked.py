@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import RecordingError
 from .held import Hands, Held, parts
 from .seen import Seen
 from .take import Take
 from .text import joined, table
 
-Array = np.ndarray
 ANEW = 0.05  # of the distance of neighbors: where it differs by more, and
 ALIKE = 8.0  # times the noise, markers were put on anew
 

@@ -18,7 +18,6 @@ from .held import gripping
 from .seen import RIGID, Seen, distances, fixtures, in_line, is_sheet, rigid
 from .text import joined
 
-Array = np.ndarray
 Group = tuple[int, ...]
 FEWEST = 3  # markers that make an object
 GAP = 2.5  # times the widest spacing in two groups, from which on a distance between them is none along an object

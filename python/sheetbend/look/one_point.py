@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arrays import timeseries
+from ..arrays.types import Array
 from ..errors import RecordingError
 from ..recording.oscillation import first_frequency
 from .cantilever import let_go, model, turning
@@ -19,7 +20,6 @@ from .seen import Seen
 from .take import Description, Measured, Take
 from .text import table
 
-Array = np.ndarray
 STRAIGHT = 0.02  # of the motion along one coordinate: how much a marker that one sensor sees moves along the others
 FEWEST, FITTED, PREDICTED = 5.0, 10.0, 20.0  # periods
 SHARE = 2 / 3  # of a short recording that is fitted

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..arrays.smoothing import smoothed
 from ..arrays.timeseries import default_max_gap, interpolate
+from ..arrays.types import Array
 from ..errors import RecordingError
 from ..statistics.white_noise import white_variance
 from .seen import RIGID, Seen
@@ -18,7 +19,6 @@ from .swing import Moments, Swing, moments
 from .take import Description, Measured, Take
 from .text import joined, table
 
-Array = np.ndarray
 Piece = tuple[dict[str, Any], float]
 """Keys of a recording that is a part of one, and when it begins."""
 SEEN_ASKEW = 0.02  # the same of three arms, which a rope is told from by how it bends

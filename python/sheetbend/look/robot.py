@@ -15,12 +15,12 @@ import numpy as np
 
 from ..arrays.poses import checked_poses, poses_at
 from ..arrays.rotations import matrices_of, quaternions_of, rotation_matrix
+from ..arrays.types import Array
 from ..errors import RecordingError, SceneError
 from ..recording.io.poses import read_poses
 from .seen import Seen
 from .text import table
 
-Array = np.ndarray
 SHIFT, COARSE, FINE = 2.0, 0.05, 0.01  # s: how far the clocks may differ, and how finely this is searched
 SHARE = 0.8  # of the frames that must lie within the poses
 STEPS, RANK = 12, 1e-3  # of Gauss-Newton; singular values, relative, below which nothing is told

@@ -20,7 +20,6 @@ from .seen import Seen
 from .stretching import Stretch, stretching
 from .take import Measured, Take
 
-Array = np.ndarray
 FITTED, LONGEST = 2 / 3, 3.0  # share of the time that is fitted, and s at most; the next third is predicted
 ROUND = 0.75  # GJ/EI of a round solid section with a Poisson ratio of 1/3
 LEAST_SIGMA = 1e-4  # m, of the markers of a motion: a model misses by as much

@@ -13,12 +13,12 @@ import numpy as np
 from ..arrays.shortest_tree import tree
 from ..arrays.smoothing import smoothed
 from ..arrays.timeseries import default_max_gap, interpolate, mean_position
+from ..arrays.types import Array
 from ..errors import RecordingError
 from ..recording.recording import Recording
 from . import strangers
 from .line import chain, turns_sharply
 
-Array = np.ndarray
 EARTH = 9.81
 STILL, CALM = 6.0, 4.0  # times the noise, by which a marker that stays may move; by which one at rest may
 SILENT = 2e-3  # of the extent: how little a marker moves that stays, where no noise is known

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-Array = np.ndarray
+from ..arrays.types import Array
+
 LONGER = 1.1  # times what was seen between two markers: how much longer the way over the fabric may be
 ROUNDS = 5  # of detours that are divided out
 REACH = 2.3  # times the nearest neighbor's distance: markers that are so near are neighbors along the fabric

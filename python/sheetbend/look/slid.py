@@ -13,12 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays.rigid import rigid_motion
+from ..arrays.types import Array
 from .end_load import free_end
 from .held import Held
 from .seen import Seen
 from .text import joined
 
-Array = np.ndarray
 PARTS, FRAMES = 10, 5  # of the time, and frames in each at least
 SHARE = 0.9  # of the distances in a part are smaller than what counts as its largest
 SWING = 1.0  # s of a motion that does not begin at rest, that show how long the way is

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays.smoothing import smoothed
+from ..arrays.types import Array
 from .seen import Seen
 
-Array = np.ndarray
 SMOOTH = 0.1  # s, over which the motion is smoothed
 COLUMNS = 4  # of markers from one held side to the other, at least
 VARIES = 1.3  # times its least: how much the tension varies at least, for a line through it

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..recording.recording import Recording
 from .text import joined
 
-Array = np.ndarray
 RARE = 0.2  # of the frames in which the best one is seen: a marker seen in fewer is a reflection, or a stray
 RESTLESS, WILD = 10.0, 0.1  # noise of a reflection: times that of the others, and of the size of what they show
 WHITE = 0.5  # of its spread, the noise of a marker that goes from anywhere to anywhere

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..arrays.types import Array
 from .seen import Seen
 
-Array = np.ndarray
 STRETCHES = 0.02  # of its length: a rope that stretches gets longer by more; others stay within a third of it
 STRAIGHT, FEWEST = 0.5, 5  # rad between neighbors at most, and markers: otherwise the line through them misses bends
 BY_NOISE = 5.0  # times the noise of a marker: by so much the length of a line through markers changes

@@ -16,7 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-Array = np.ndarray
+from ..arrays.types import Array
+
 INTERVAL = 0.2  # s, of one momentum balance
 UNIFORM = 4.0 / 3.0  # mass over first_moment^2/inertia of a uniform rod
 LEAST, MOST = 1.1, 0.8  # of first_moment^2/inertia, an arm's mass at least; of what its carrier has room for, at most

@@ -6,7 +6,8 @@ from collections import deque
 
 import numpy as np
 
-from .topology import Indices, half_edges
+from ..arrays.types import Indices
+from .topology import half_edges
 
 
 def turned_alike(triangles: Indices) -> Indices:

@@ -8,11 +8,8 @@ curvatures are the height field z = x.H x / 2 sampled at the vertices: linear in
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .topology import Indices
-
-Array = NDArray[np.float64]
+from ..arrays.types import Array, Indices
 
 
 def bending_form(corners: Array, twin: Indices, inside: bool) -> Array:

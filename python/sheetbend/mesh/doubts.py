@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays.types import Array, Indices
 from . import topology
-from .topology import Indices
 from .unfold import warp_turns
 from .validate import signed_areas
-
-Array = NDArray[np.float64]
 
 _SPLINTER = np.radians(5.0)  # smallest angle below which a triangle is named
 _SMALL = 1e-3  # of the median area

@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_kind, finite, numbers
+from ..arrays.types import Array
 from ..errors import MeshError
 from ..files.whole import write_text, written
 from .triangle_mesh import TriangleMesh
-
-Array = NDArray[np.float64]
 
 
 def write_obj(path: str | Path, mesh: TriangleMesh, positions: ArrayLike | None = None) -> None:

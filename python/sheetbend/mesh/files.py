@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.checks import finite
+from ..arrays.types import Array
 from ..errors import MeshError
 from ..files.door import check_file, note, reading
 from ..files.units import METERS
@@ -23,8 +24,6 @@ from .alike import turned_alike
 from .triangle_mesh import TriangleMesh
 from .unfold import unfold
 from .validate import checked_triangles, refuse_broken, signed_areas
-
-Array = NDArray[np.float64]
 
 # How trimesh keeps the order of the file's vertices, and how it splits them where texture coordinates differ.
 _FORMATS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.checks import check_count, is_number
+from ..arrays.types import Indices
 from ..errors import MeshError
-from .topology import Indices
 from .triangle_mesh import TriangleMesh
 from .validate import MOST_CELLS
 

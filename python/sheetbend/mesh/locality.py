@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays.checks import check_kind
+from ..arrays.types import Indices
 from ..errors import MeshError
-from .topology import Indices
 from .triangle_mesh import TriangleMesh
 
 

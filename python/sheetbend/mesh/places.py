@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays.types import Array, Indices
 from ..errors import MeshError
-from .topology import Indices
-
-Array = NDArray[np.float64]
 
 _ON = 1e-9  # a weight this far below zero still counts as on the edge
 _INSIDE = 1e-6  # a point with larger weights is off the edges

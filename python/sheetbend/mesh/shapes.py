@@ -6,13 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.checks import check_count, is_number
+from ..arrays.types import Array, Indices
 from ..errors import MeshError
 from . import topology
-from .topology import Indices
 from .triangle_mesh import TriangleMesh
 from .unfold import unfold
-
-Array = NDArray[np.float64]
 
 MOST_RINGS, MOST_SPLITS = 1000, 9  # 6 and 5 million triangles
 

@@ -9,13 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays.types import Array, Indices
 from .places import closest_weights, nearest
 from .topology import twins
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 CHUNK = 16384  # points that go down the tree together
 ROUNDING = 1.0 + 1e-9  # of distances that are compared

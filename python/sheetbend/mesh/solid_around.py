@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays.checks import check_kind, is_number
+from ..arrays.types import Array
 from ..errors import MeshError
 from .solid_mesh import SolidMesh, bricks
 from .triangle_mesh import TriangleMesh
 
-Array = NDArray[np.float64]
 _SAMPLES = 3  # along each side of a brick
 _LEAST = 0.5 / _SAMPLES**3  # of a brick that the surface only touches
 _ASIDE = 1e-6  # of a sample: off the edges of triangles that lie on the grid

@@ -8,9 +8,10 @@ from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_count, check_kind, finite, index_array, whole
+from ..arrays.types import Array, Indices
 from ..errors import MeshError
 from . import validate
 from .places import nearest
@@ -18,8 +19,6 @@ from .solid_element import CORNERS, FACES, own_coordinates, quadrature, surface_
 from .triangle_mesh import TriangleMesh
 from .validate import MOST_CELLS
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 _MARGIN = 1e-6  # of an element's size, by which a point may lie outside of it
 
 

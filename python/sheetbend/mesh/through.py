@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..arrays.checks import finite, numbers
+from ..arrays.types import Array
 from ..errors import MeshError
-
-Array = NDArray[np.float64]
 
 _LINE = 1e-6  # of their extent: points that lie so near to a line lead no surface
 

@@ -6,9 +6,8 @@ Half-edge 3 t + j of triangle t leads from its corner j to its corner j + 1; its
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Indices = NDArray[np.int64]
+from ..arrays.types import Indices
 
 
 def half_edges(triangles: Indices) -> Indices:

@@ -9,16 +9,15 @@ from types import MappingProxyType
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_kind, finite, whole
+from ..arrays.types import Array, Indices
 from ..errors import MeshError
 from . import bending_ratio, doubts, places, topology, validate
 from .places import Places
 from .through import through
-from .topology import Indices
 
-Array = NDArray[np.float64]
 _AnyArray = TypeVar("_AnyArray", Array, Indices)
 
 _ONE_WAY = 2.0  # good patterns have 1 to 1.5, one-way diagonals 4

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..arrays.checks import finite
+from ..arrays.types import Array, Indices
 from ..errors import MeshError
 from . import topology, validate
-from .topology import Indices
-
-Array = NDArray[np.float64]
 
 _SAME_PLACE = 1e-6  # of the size of the mesh: files hold no more digits
 _JUMP = np.radians(5.0)

@@ -6,11 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.checks import finite, numbers, whole
+from ..arrays.types import Array, Indices
 from ..errors import MeshError
 from . import topology
-from .topology import Indices
-
-Array = NDArray[np.float64]
 
 NO_AREA = 1e-12  # of the square of the longest edge: rounding of the coordinates
 

@@ -17,7 +17,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..quantities.parameters import Parameters
 from .coordinates import Coordinates
 from .counts import counted

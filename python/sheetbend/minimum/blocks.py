@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import InputError, SheetbendError
 from ..experiment.experiment import Experiment
 from ..quantities.parameters import Parameters

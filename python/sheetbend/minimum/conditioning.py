@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..quantities.wording import short
 
 POOR = 1e4  # condition from which on the parameters that are alike are named

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import InputError
 from ..experiment.cut import LEAST_FRAMES, LEAST_STEPS, borders, cut, shot, start_quantities
 from ..experiment.experiment import Experiment

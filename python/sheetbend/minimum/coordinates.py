@@ -21,7 +21,7 @@ from typing import Self
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..quantities.parameters import DEFAULT_RANGE, Parameters
 from ..quantities.wording import short
 from ..scene.scene import Scene

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..objects.over_time import OverTime
 from ..objects.stiffness_field import StiffnessField
 from ..result.field import FieldFit

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..quantities.parameters import Parameters
 from ..statistics.spectral import autocorrelation
 from .growth import growths

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..quantities.parameters import Parameters
 from ..result.estimate import Estimate
 from ..result.result import Refit

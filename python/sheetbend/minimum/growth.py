@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import _core
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import NoEquilibriumError
 from ..experiment.cut import shot, start_quantities
 from ..experiment.experiment import Experiment

@@ -16,7 +16,7 @@ from typing import Any, cast
 import numpy as np
 
 from .. import _core
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..experiment.cut import shot
 from ..experiment.experiment import Experiment
 from ..quantities.parameters import Parameters

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..experiment.cut import borders, free_particles, shot, start_quantities
 from ..experiment.experiment import Experiment
 from ..recording.recording import Recording

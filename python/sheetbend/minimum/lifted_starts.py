@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..experiment.cut import borders, shot, start_quantities
 from ..experiment.experiment import Experiment
 from ..optional import require

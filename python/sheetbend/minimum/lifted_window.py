@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..experiment.cut import free_particles, piece, shot, start_quantities
 from ..experiment.experiment import Experiment
 from ..objects.markers import on_particle

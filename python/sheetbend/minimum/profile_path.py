@@ -28,7 +28,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.least_squares import solved
 from .approach import inside

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 
 FAR_OFF = 1.0  # of the rise: where the others leave more, a point tells little
 LEAST = 0.05  # of the linear height: an interpolation below this is none

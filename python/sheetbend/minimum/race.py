@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import SheetbendError
 from .approach import Approach, Tally
 from .problem import FitProblem

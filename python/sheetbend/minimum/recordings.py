@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..experiment.experiment import Experiment
 from ..quantities.parameters import Parameters
 from ..scene.scene import Scene

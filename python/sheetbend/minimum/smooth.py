@@ -15,7 +15,7 @@ from dataclasses import field as of_field
 import numpy as np
 
 from ..arrays.checks import check_kind, is_number
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import InputError
 from ..experiment.experiment import Experiment
 from ..objects.over_time import OverTime

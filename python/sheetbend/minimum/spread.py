@@ -13,7 +13,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from .. import _core
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..experiment.experiment import Experiment
 from ..quantities.parameters import Parameters
 from .workers import Common, current

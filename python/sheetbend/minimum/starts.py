@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import InputError
 from ..optional import require
 from ..quantities.parameters import Parameter, Parameters

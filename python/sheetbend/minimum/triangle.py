@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 
 ROWS = 1024  # that are reduced at a time: so many fit into the cache of a processor
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import InputError
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 from .core_terms import compiled_of, divergence, substeps
 from .solver import Solver
 

@@ -11,12 +11,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..quantities.wording import short
 from ..scene.compiled import CompiledScene
 from ..scene.scene import Scene
 from .contact_counts import ContactMode
 
-Array = np.ndarray
 SHARE = 0.1  # of its radius, that a rigid contact may yield
 UNSEEN = 1e-4  # m, that it may yield where its radius is smaller: what recordings of markers do not show
 

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _core
+from ..arrays.types import Array
 from ..errors import InputError
 
-Array = np.ndarray
 ORDERS = {"bdf1": 1, "bdf2": 2}
 MOST = 3  # runs
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..scene.compiled import CompiledScene
-
-Array = np.ndarray
 
 
 class InputsOfQuantities:

@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike
 
 from .. import _core
 from ..arrays.checks import check_kind, numbers
+from ..arrays.types import Array
 from ..errors import EmptyGradientError, InputError, choices
 from ..scene.scene import Scene
 from .core_terms import compiled_of, divergence, over_all_nodes, substeps
 from .solver import Solver
 from .tape import TapePlan, planned
 
-Array = np.ndarray
 log = logging.getLogger(__name__)
 
 

@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import InputError
 from ..scene.scene import Scene
 from .core_terms import divergence
 from .solver import Solver
 from .tape import budget
-
-Array = np.ndarray
 
 
 class Rollouts:

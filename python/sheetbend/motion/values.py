@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 
 from .. import _core
 from ..arrays.checks import check_kind
+from ..arrays.types import Array
 from ..quantities.kinds import KINDS
 from ..scene.group import Group, places_of_groups
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 from .core_terms import compiled_of, forces_by_group
 from .equilibrium import Equilibrium, whole_start
 

@@ -10,8 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import SceneError
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 from .stiffness_field import StiffnessField
 
 COSINE = 0.5**0.5  # root mean square of a mode

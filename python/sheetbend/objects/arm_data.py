@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..arrays.types import Array
 from ..quantities.quantities import Term
-from ..scene.scene import Array
 from .markers import Place
 
 

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_label
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.expression import expressions
 from ..scene.body import Body, BodyPoint
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 from .grip import any_across
 from .joint_making import constrain, ground
 

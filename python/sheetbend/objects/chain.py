@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_count, check_label, finite, is_number, points
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.quantities import ZERO_OR_MORE, product
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 
 MOST_LINKS = 10**6
 """Of one rope: more is a slip of the pen. A configuration allows fewer, `config.section.MOST_SEGMENTS`."""

@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_count, check_kind, check_label, check_positive, finite, is_number, some_indices
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..mesh import TriangleMesh
 from ..quantities.quantities import Term
 from ..scene.given import check_scene
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 from .cloth_cut import Cut
 from .flat_size import FlatSize
 from .hinges import Hinges

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ..arrays.types import Array
 from ..mesh import TriangleMesh
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 from .flat_size import FlatSize
 
 

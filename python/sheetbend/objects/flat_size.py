@@ -12,10 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays.checks import is_number
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..mesh import TriangleMesh
 from ..quantities.quantities import Term
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 
 LIMITS = (0.8, 1.25)  # beyond them the mesh is the wrong one
 POWERS = (-1, 0, 1, 2)  # of b/a, by which `of_edges` goes

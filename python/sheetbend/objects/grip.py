@@ -11,10 +11,9 @@ from ..arrays.checks import check_kind, finite, is_number, numbers
 from ..arrays.rigid import rigid_motion
 from ..arrays.rotations import rotated, unit_quaternions
 from ..arrays.smoothing import smoothed
+from ..arrays.types import Array
 from ..errors import SceneError
 from .hand_eye import HandEye
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..arrays.checks import is_number
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.quantities import Term, product
 from ..scene.in_frame import add_motion_in_frame
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 from .chain import voronoi_shares
 from .grip import Grip
 

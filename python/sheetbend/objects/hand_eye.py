@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_label, finite, is_number, vectors
 from ..arrays.rotations import rotated, unit_quaternions
+from ..arrays.types import Array
 from ..errors import InputError, SceneError
 from ..quantities.expression import rotation, rotation_products, vector
 from ..quantities.parameters import Parameter
@@ -28,7 +29,6 @@ from ..scene.moving_clamp import clamped_ends
 if TYPE_CHECKING:
     from ..scene.scene import Scene
 
-Array = np.ndarray
 AXES = "xyz"
 SHIFT, TURN = 0.01, 0.1  # m, rad: the sizes against which the precision of the six is judged
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..mesh import TriangleMesh
-from ..scene.scene import Array
 from .cloth_cut import Cut
 from .elastic_group import add_elastic_group
 

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_label, finite, is_number
+from ..arrays.types import Array
 from ..errors import SceneError
-from ..quantities.expression import Array, Expression, cross, expressions, names_in, numbers, terms_of, vector
+from ..quantities.expression import Expression, cross, expressions, names_in, numbers, terms_of, vector
 from ..quantities.quantities import ZERO_OR_MORE, Term
 from ..scene.body import AXES, GROUND, PLACE, Body, FrameState, HasMotion, Values
 from ..scene.given import check_scene

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_increasing, finite, is_number
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.expression import Expression
 from ..quantities.quantities import Term
-from ..scene.scene import Array
 from .joint_limits import PER, RATE, SIZE
 from .joint_making import Making
 from .pivot import add_slip_angle, check_friction

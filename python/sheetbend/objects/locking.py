@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..mesh import SolidMesh
 from ..optional import MissingExtraError, require
 
-Array = np.ndarray
 _MOST = 5_000  # tetrahedra, above which the answer takes more than some seconds
 _EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
 _A, _B = (5.0 + 3.0 * np.sqrt(5.0)) / 20.0, (5.0 - np.sqrt(5.0)) / 20.0

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_count, check_kind, finite, is_list, is_number, vectors
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..mesh import Places
-from ..quantities.expression import Array, Expression, expressions
+from ..quantities.expression import Expression, expressions
 from ..scene.body import Body
 from ..scene.scene import Scene
 from .cloth import Cloth

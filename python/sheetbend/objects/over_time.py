@@ -12,9 +12,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_label, is_number
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.expression import Expression
 from ..scene.body import BodyPoint
@@ -24,7 +25,6 @@ from .chain import voronoi_shares
 from .rope import Rope
 from .stiffness_field import modes_of_laplacian, shares, signed
 
-Array = NDArray[np.float64]
 AXES = "xyz"
 MOST_KNOTS = 200  # three numbers for each, and a Jacobian takes a run with tangents for every eight numbers
 

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_count, check_label, check_positive
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.quantities import product
 from ..scene.body import BodyPoint
 from ..scene.given import check_scene
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 from .along_rope import softness_field
 from .chain import MOST_LINKS, add_drag, add_links, add_masses, check_damping, time_constant
 from .grip import Grip

@@ -8,11 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..arrays.checks import is_several
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.quantities import Term
 from ..scene.body import BodyPoint
 from ..scene.in_frame import drive_in_frame
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 from . import body_end
 from .body_end import frame_at, hold_direction, hold_place
 from .grip import Grip

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import finite
+from ..arrays.types import Array
 from ..errors import SceneError
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 from .grip import any_across, carried
 from .rod_end import End
 from .rod_shape import initial_frames

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.quantities import Term
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 from .along_rope import mode_quantities
 from .chain import voronoi_shares
 

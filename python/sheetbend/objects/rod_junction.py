@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays.types import Array
 from ..errors import SceneError
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 from .chain import unit_vector
 from .grip import carried
 

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import finite
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.quantities import Term
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 from .chain import resample
 from .grip import any_across, carried
 from .rope_grips import Chain

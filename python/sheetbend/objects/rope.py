@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_positive, some_indices
+from ..arrays.types import Array
 from ..scene.body import BodyPoint
 from ..scene.given import check_scene
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 from .chain import (
     add_drag,
     add_links,

@@ -7,11 +7,12 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.quantities import product
 from ..scene.body import BodyPoint
 from ..scene.in_frame import drive_in_frame
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 from .body_end import STUB, hold_place
 from .chain import TimeConstant, unit_vector, voronoi_shares
 from .grip import Grip

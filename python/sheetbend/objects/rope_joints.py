@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..arrays.checks import is_list, is_number
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.quantities import Term, product
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 from .along_rope import mode_quantities, softness_field
 from .chain import TimeConstant, voronoi_shares
 from .rope_grips import Chain

@@ -7,10 +7,10 @@ import warnings
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..mesh import TriangleMesh
 from ..quantities.quantities import Term
-from ..scene.scene import Array
 from .cloth_cut import Cut
 from .elastic_group import add_elastic_group
 from .hinges import rest_angles

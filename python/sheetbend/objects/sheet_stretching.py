@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..quantities.quantities import Term
-from ..scene.scene import Array
 from .cloth_cut import Cut
 from .elastic_group import add_elastic_group
 from .stiffness_field import StiffnessField

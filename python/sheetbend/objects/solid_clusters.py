@@ -16,10 +16,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_kind, finite, indices
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..mesh import SolidMesh
 from ..quantities.quantities import Term
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 from .stiffness_field import StiffnessField, field_of_modes, modes_of
 
 SHARE = 1e-3

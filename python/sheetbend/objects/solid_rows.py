@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import finite
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..mesh import SolidMesh
 from ..quantities.quantities import Term
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 
 STRAIN = {8: "brick_strain", 4: "tetrahedron_strain"}
 YIELDING = "yielding_brick_strain"

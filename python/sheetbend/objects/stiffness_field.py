@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..mesh import TriangleMesh
 from ..scene.scene import Scene
 
-Array = NDArray[np.float64]
 FLAT = 1e-6  # of the longest extent: along shorter ones neighbors do not differ
 SCALE = 0.3  # of a mode of ln E: what it may well be
 MOST = 4000  # triangles, whose modes take a matrix of their number squared

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ..arrays.checks import finite, is_number, vectors
 from ..arrays.poses import checked_poses, poses_at
 from ..arrays.rotations import rotated, rotation_vectors
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.quantities import ZERO_OR_MORE
 from ..recording.io.poses import read_poses
@@ -20,7 +21,6 @@ from ..scene.given import check_scene
 from ..scene.scene import Scene
 from .hand_eye import HandEye
 
-Array = np.ndarray
 Shape = TypeVar("Shape", bound=Collider)
 COVERED = 1e-9  # s
 SMOOTHING, FEWEST = 0.1, 5  # s and poses, over which an acceleration is taken from a parabola

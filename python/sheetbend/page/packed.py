@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays.types import Array
 from .shown import Sheet, Shown
 
-Array = np.ndarray
 MOST_FRAMES = 300  # drawn of one motion
 MOST_BYTES = 3_000_000  # of all motions of a page
 MISSING = -32768  # of a marker that was not seen

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..doubts.prediction import Comparison
 from ..fitting.fit import Fit
 from ..fitting.fitted_motion import fitted_positions
@@ -19,7 +20,6 @@ from ..recording.cloud import Cloud
 from ..recording.recording import Recording
 from ..scene.scene import Scene
 
-Array = np.ndarray
 TICK = 0.02  # of the motion's extent: length of the mark that shows how a rod is twisted
 
 

@@ -6,10 +6,10 @@ from itertools import combinations
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..scene.body import GROUND
 from ..scene.scene import Scene
 
-Array = np.ndarray
 CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 EDGES = [(i, j) for i, j in combinations(range(8), 2) if np.count_nonzero(CORNERS[i] != CORNERS[j]) == 1]
 

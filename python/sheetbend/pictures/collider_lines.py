@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays.rotations import rotation_matrix
+from ..arrays.types import Array
 from ..scene.colliders import Collider, Motion
 from ..scene.distance_field import DistanceField
 from ..scene.scene import Scene
 
-Array = np.ndarray
 AROUND = np.linspace(0.0, 2.0 * np.pi, 25)  # of a circle
 CELLS = 8  # of the grid of a plane, along each side
 MARGIN = 0.1  # of the motion's extent, by which that grid is larger

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..arrays.checks import check_each, given_by_name
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..optional import require
 from ..quantities.wording import raised
 from ..result.estimate import Estimate

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_each, check_kind, finite
+from ..arrays.types import Array
 from ..errors import InputError
 from ..mesh import Places, TriangleMesh
 from ..optional import require
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = np.ndarray
 _DARK = "#063d4e"  # beyond the accent, for the upper end of what is never negative
 
 

@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import InputError
 from ..files.whole import written
 from ..motion.simulate import Trajectory
 from ..scene.scene import Scene
 from ..version import __version__
-from .moving_shapes import Array, MovingShape, chosen_frames, moving_shapes, tube, turn_between, up_of
+from .moving_shapes import MovingShape, chosen_frames, moving_shapes, tube, turn_between, up_of
 
 MOST_FRAMES = 240
 """Each frame is a morph target, of which some programs take no more than a few hundred."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import InputError
 from ..files.whole import written
 from ..optional import require
@@ -22,7 +23,6 @@ from .strain import largest_strain
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = np.ndarray
 Layer = Callable[[int], None]
 """Draws a frame."""
 SUFFIXES = (".gif", ".mp4")

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays.types import Array
 from ..errors import InputError
 from ..motion.simulate import Trajectory
 from ..scene.scene import Scene
 from .strain import largest_strain
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)

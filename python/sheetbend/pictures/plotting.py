@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_each, check_kind, is_list, numbers, some_indices
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..doubts.prediction import Comparison
 from ..errors import InputError
 from ..files.whole import written

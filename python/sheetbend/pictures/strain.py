@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_kind, finite
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..mesh import TriangleMesh
 from ..motion.values import elastic_energy
 from ..objects.cloth import Cloth
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 
 
 def green_strain(mesh: TriangleMesh, positions: ArrayLike) -> Array:

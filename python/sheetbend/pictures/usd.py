@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import InputError
 from ..files.whole import written
 from ..motion.simulate import Trajectory
 from ..optional import require
 from ..scene.scene import Scene
 from ..version import __version__
-from .moving_shapes import Array, MovingShape, moving_shapes, turn_between, up_of
+from .moving_shapes import MovingShape, moving_shapes, turn_between, up_of
 
 SUFFIXES = (".usd", ".usda", ".usdc")
 

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.rotations import cross_matrix
+from ..arrays.types import Array
 from .quantities import Term
 
-Array = np.ndarray
 Factors = tuple[tuple[str, str], ...]  # (quantity, function), sorted
 VALUES: Mapping[str, Callable[[float], float]] = {
     "identity": float,

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.checks import is_bound, is_number, is_several
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import InputError
 
 DEFAULT_RANGE = 1e6

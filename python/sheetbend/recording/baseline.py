@@ -27,7 +27,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.checks import check_kind, is_several
-from ..arrays.timeseries import Array, mean_position
+from ..arrays.timeseries import mean_position
+from ..arrays.types import Array
 from ..errors import RecordingError
 from .cloud import Cloud
 from .recording import Recording

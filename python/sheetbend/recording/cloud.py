@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_count, finite, is_list, is_number
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import RecordingError
 from ..files.names import checked_name
 from .io import cloud as file_of_cloud

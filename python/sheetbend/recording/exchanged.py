@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.shortest_tree import tree
-from ..arrays.timeseries import Array, stretches
+from ..arrays.timeseries import stretches
+from ..arrays.types import Array
 
 FEWEST, MANY = 20, 300  # frames at least, and those that tell distances at most
 PAIRS = 10_000_000  # of markers in these frames, at most: distances then take 0.3 GB

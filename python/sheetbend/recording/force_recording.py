@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import numbers
+from ..arrays.types import Array
 from ..errors import RecordingError
 from ..files.door import check_room, reading
 from ..files.whole import written
 from .io import cells, clock, npz
 from .recording_checks import checked_times
 
-Array = np.ndarray
 FORCES, TORQUES, TURNS = ("fx", "fy", "fz"), ("tx", "ty", "tz"), ("qx", "qy", "qz", "qw")
 _FIX = "start with time,fx,fy,fz, then tx,ty,tz and qx,qy,qz,qw where they were recorded"
 

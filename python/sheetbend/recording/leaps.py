@@ -8,7 +8,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.timeseries import Array, noise
+from ..arrays.timeseries import noise
+from ..arrays.types import Array
 
 Mask = NDArray[np.bool_]
 

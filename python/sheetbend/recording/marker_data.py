@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..files.names import checked_name
 from .recording_checks import (
     check_seen,

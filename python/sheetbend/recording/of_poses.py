@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_increasing, finite, numbers, vectors
 from ..arrays.rotations import matrices_of, quaternions_of, rotation_matrix, rotation_vectors
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import RecordingError, SceneError
 
 FEWEST = 2  # poses that show a velocity

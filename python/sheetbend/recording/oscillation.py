@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.timeseries import Array, mean_position
+from ..arrays.timeseries import mean_position
+from ..arrays.types import Array
 
 FEWEST_PERIODS = 3.0
 """Below this many periods a window and a trend cannot be told from a frequency."""

@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import timeseries
 from ..arrays.checks import MOST, is_bound, is_list, is_number, numbers
-from ..arrays.timeseries import Array, Kind
+from ..arrays.timeseries import Kind
+from ..arrays.types import Array
 from ..errors import RecordingError
 from ..files.names import checked_name
 from . import io

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import is_several
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import RecordingError
 
 

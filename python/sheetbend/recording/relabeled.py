@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..arrays import timeseries
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from .exchanged import put_back_neighbors
 from .leaps import SUDDEN, elsewhere, least_leap
 

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_increasing, check_label, finite, per_item, triangle_array
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.quantities import ZERO_OR_MORE, Builder, Term
 
-Array = np.ndarray
 WIND = ("wind_x", "wind_y", "wind_z")
 STRENGTH = "wind_strength"
 NAMED_KNOTS = 50  # a wind of more has no quantity for each

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.quantities import Term
 
-Array = np.ndarray
 TOUCHES = 1e-6  # m: so deep two may be in each other at the start
 
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_increasing, finite, is_number
 from ..arrays.rotations import matrices_of, rotation_matrix
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.expression import Expression, by_factors, expressions, numbers, rotation, terms_of, vector
 from ..quantities.quantities import ZERO_OR_MORE, Term
@@ -21,7 +22,6 @@ from .inertia import Inertia
 from .nodes import SceneNodes
 from .scene_data import SceneData
 
-Array = np.ndarray
 KNOTS = 3  # at least, of poses that drive a body
 SPEED, SPIN = 0.1, 1.0  # m/s, rad/s: sizes against which precision is judged
 

@@ -19,11 +19,11 @@ from numpy.typing import ArrayLike
 from ..arrays import checks
 from ..arrays.checks import check_label, finite
 from ..arrays.rotations import quaternions_of
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.expression import cross, expressions, names_in, numbers, terms_of, vector
 from ..quantities.quantities import Builder, Quantity, Term, intermediate
 
-Array = np.ndarray
 Values = Mapping[str, float] | None
 AXES = "xyz"
 GROUND = "ground"  # the name of the body that stands for the world

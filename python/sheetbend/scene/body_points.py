@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import finite
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..mesh.triangle_mesh import TriangleMesh
 from .body import Body
-
-Array = np.ndarray
 
 
 def box_corners(sides: ArrayLike, center: ArrayLike = (0.0, 0.0, 0.0)) -> Array:

@@ -11,10 +11,9 @@ from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_increasing, finite
 from ..arrays.smoothing import LocalFit
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.quantities import Term
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)

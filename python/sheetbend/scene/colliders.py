@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_increasing, check_positive, finite
 from ..arrays.rotations import product, quaternion_of, rotation_vectors
+from ..arrays.types import Array
 from ..errors import SceneError
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)

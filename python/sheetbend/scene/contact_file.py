@@ -7,13 +7,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import SceneError
 from .balls import Balls
 from .colliders import Box, Capsule, Collider, Cylinder, Motion, Plane, Sphere
 from .contacts import ARRAYS, Contact
 from .scene import Scene
 
-Array = np.ndarray
 BODY = 4  # nodes of a point of a body
 MADE_BY_QUANTITIES = tuple(name for name in ARRAYS if name != "collider_pose")
 

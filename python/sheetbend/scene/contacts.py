@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_label, is_number, node_array
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.expression import terms_of
 from ..quantities.quantities import ZERO_OR_MORE, Builder, Term
@@ -18,7 +19,6 @@ from .body_points import BodyPoints
 from .colliders import Collider
 from .pieces import PairFriction, Piece, piece_terms
 
-Array = np.ndarray
 ARRAYS = (
     *("friction", "contact_radius", "contact_stiffness", "collider_pose", "collider_size", "restitution"),
     *("contact_weight", "contact_dissipation"),

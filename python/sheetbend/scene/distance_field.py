@@ -7,15 +7,15 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..mesh import TriangleMesh
 from ..mesh.signed_distance import signed_distances
 from .colliders import Collider
 from .inertia import check_closed
 
-Array = NDArray[np.float64]
 CELLS = 32  # along the longest side of the mesh, where no spacing is given
 MARGIN = 4  # cells of the grid around the mesh, where no margin is given
 MOST_POINTS = 16_000_000  # of a grid: 128 MB

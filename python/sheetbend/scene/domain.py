@@ -10,13 +10,13 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.kinds import KINDS
 from ..quantities.quantities import intermediate_of
 from .group import OF_CONSTRAINTS, places_of_groups
 from .scene_data import SceneData
 
-Array = np.ndarray
 HUGE = float(np.finfo(float).max)
 TINY = float(np.nextafter(0.0, 1.0))
 NOT_NEGATIVE = (

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_increasing, finite
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.expression import Expression, Factors, by_factors
 from ..quantities.quantities import Term
-
-Array = np.ndarray
 
 
 def spread_over(forces: ArrayLike, shape: tuple[int, ...]) -> Array:

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import finite
+from ..arrays.types import Array
 from ..errors import SceneError
 
-Array = np.ndarray
 Frame = tuple[int, int, int | None]  # an edge from, to; the section's normal
 
 

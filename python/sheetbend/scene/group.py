@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import node_array, per_item
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.kinds import KINDS, VISCOUS_COMPLIANCE
 from .rest_values import rest_values
-
-Array = np.ndarray
 
 OF_CONSTRAINTS = ("compliance", "damping", "rest")
 """Input arrays with entries of constraints, one group after the other."""

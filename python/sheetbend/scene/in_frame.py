@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, Protocol
 
-import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays.types import Array
 from .body import FrameState
 from .held import HeldScene
-
-Array = np.ndarray
 
 
 class HasCorrection(Protocol):

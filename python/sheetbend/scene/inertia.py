@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_kind, finite, is_number
 from ..arrays.rotations import rotation_matrix
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..mesh.topology import half_edges
 from ..mesh.triangle_mesh import TriangleMesh
 
-Array = np.ndarray
 SLACK = 1e-9  # relative, by which a body may be flatter than flat from rounding
 
 

@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..quantities.quantities import Term
-
-Array = np.ndarray
 
 
 def start_terms(means: Mapping[int, tuple[Array, Array]], terms: Sequence[Term], x: Array, v: Array) -> list[Term]:

@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import finite, per_item, points
+from ..arrays.types import Array
 from ..errors import SceneError
 from .frames import directors_of, normals_of
 from .scene_data import SceneData
-
-Array = np.ndarray
 
 
 class SceneNodes(SceneData):

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.expression import terms_of
 from ..quantities.quantities import Term
 from .body import BodyCapsules
 
-Array = np.ndarray
 TOUCHES = 1e-6  # m: so deep a pair may be at the start
 
 

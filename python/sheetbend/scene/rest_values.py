@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .. import _core
 from ..arrays.checks import finite
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.kinds import KINDS, parameters_in_rest, range_in_words
-
-Array = NDArray[np.float64]
 
 
 def rest_values(name: str, kind: str, x: Array, rest: ArrayLike | None, normal: ArrayLike | None) -> Array:

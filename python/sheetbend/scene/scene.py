@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_kind, check_label, node_array, per_item
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..mesh.triangle_mesh import TriangleMesh
 from ..quantities.kinds import KINDS
@@ -38,8 +39,6 @@ from .contacts import ContactNumbers, HasParticles
 from .group import make_group
 from .inertia import Inertia
 from .scene_checks import validate
-
-Array = np.ndarray
 
 
 class Scene(BlownScene):

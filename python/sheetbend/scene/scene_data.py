@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_label, finite, node_array
 from ..arrays.column import Column
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.quantities import Quantity, Term
 from .air import Air
@@ -21,8 +22,6 @@ from .frames import Frame
 from .group import Group, GroupPlaces, places_of_groups
 from .means import start_terms
 from .volume import Volumes
-
-Array = np.ndarray
 
 
 class Rows:

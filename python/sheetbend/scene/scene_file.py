@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..files.whole import written
 from .compiled import specification
@@ -29,8 +30,6 @@ from .scene_reader import (
     file_layout,
     is_name,
 )
-
-Array = np.ndarray
 
 
 def save_scene(scene: Scene, path: str | Path) -> None:

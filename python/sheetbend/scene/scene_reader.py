@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from .. import _core
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..files.memory import free_memory, in_words
 from ..quantities.kinds import KINDS
@@ -24,8 +25,6 @@ from .contacts import ARRAYS as CONTACT_ARRAYS
 from .domain import NOT_NEGATIVE
 from .group import Group
 from .scene import Scene
-
-Array = np.ndarray
 
 MAGIC = b"SBSCENE\n"
 VERSION = 1

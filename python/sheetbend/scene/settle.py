@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import SceneError
 from .contacts import Contact
 from .scene_data import SceneData
 
-Array = np.ndarray
 ROUNDS = 50  # of moves out of all colliders in turn, which may overlap
 NONE = 1e-12  # m, an overlap that counts as none
 

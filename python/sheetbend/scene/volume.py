@@ -6,11 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_label, is_number, triangle_array
+from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.quantities import Builder, Term
 from .inertia import check_closed
-
-Array = np.ndarray
 
 
 class Volumes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 
 
 def levinson(lags: Array) -> list[tuple[Array, float]]:

@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..optional import require
 from .covariance import Covariance, Sandwich
 from .gauge import null_space

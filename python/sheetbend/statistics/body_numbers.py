@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays.rotations import cross_matrix
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from .gauge import RANK_TOLERANCE, Gauge, NullSpace, signed_sum
 
 KINDS = ("mass", "center", "inertia", "axes_turn")

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 
 WEAK = 1e-12  # of a column: what no row determines stays where it is
 UNFELT = 1e-100  # size of a column that no row feels: one, so that squares of its inverse stay finite

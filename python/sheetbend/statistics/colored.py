@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 
 Integers = NDArray[np.integer[Any]]
 

@@ -30,7 +30,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import InputError
 from .layout import Layout
 from .newey_west import newey_west

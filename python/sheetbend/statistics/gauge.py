@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 
 RANK_TOLERANCE = 1e-6
 """Singular values below this part of the largest count as zero (columns scaled to unit length)."""

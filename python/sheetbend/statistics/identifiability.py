@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import InputError
 from ..quantities.parameters import Parameters
 from ..result.estimate import Correlation, Estimate

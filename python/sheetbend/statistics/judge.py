@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..optional import require
 from ..quantities.parameters import Parameter, Parameters
 from ..quantities.wording import figures, floor_words, quantity, ran_off_words, side_words

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..optional import require
 from .blocks import Split, independent, short_of_frames
 from .covariance import covariance

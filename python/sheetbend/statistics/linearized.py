@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from .gauge import RANK_TOLERANCE
 from .layout import Layout
 

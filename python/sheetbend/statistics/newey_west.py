@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 
 
 def newey_west(scores: list[Array]) -> Array:

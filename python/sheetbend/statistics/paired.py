@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..optional import require
 
-Array = np.ndarray
 FEWEST = 4  # independent stretches below which no interval is given
 MOST = 24  # stretches of one recording
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from .colored import Part
 from .layout import Integers, Layout
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from .autoregression import levinson, spectrum_of
 from .colored import Colored, Part
 from .layout import Integers, Layout

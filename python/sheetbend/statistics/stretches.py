@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from .layout import Layout
 from .white_noise import white_noise
 

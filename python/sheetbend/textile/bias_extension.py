@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..errors import InputError
 from ..mesh import grid
 from ..motion.equilibrium import Equilibrium
 from ..objects.fabric import Fabric
-from ..scene.scene import Array
 from .arguments import check_specimen
 from .flat import flat_rest, jaw, jaw_force, specimen, travel, turned
 from .reading import GRAM_FORCE, Reading, combined

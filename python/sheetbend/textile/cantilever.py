@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..mesh import grid
 from ..motion.equilibrium import Equilibrium, equilibrium
 from ..objects.cloth import add_cloth
 from ..objects.fabric import Fabric
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 from .arguments import check_specimen
 from .flat import turned, warp_angle
 from .reading import Reading, combined

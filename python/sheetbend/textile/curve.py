@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..arrays.checks import check_count, check_kind, finite, is_list
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import InputError
 
 TESTS = ("tension", "shear", "bending")

@@ -10,13 +10,14 @@ from typing import TypedDict
 import numpy as np
 
 from ..arrays.checks import check_count, check_kind, check_positive, is_list, is_number
+from ..arrays.types import Array
 from ..errors import InputError, MeshError, NoEquilibriumError
 from ..mesh import TriangleMesh, disk
 from ..motion.equilibrium import Equilibrium, equilibrium
 from ..objects.cloth import add_cloth
 from ..objects.fabric import Fabric
 from ..scene.colliders import Cylinder
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 from .arguments import check_specimen
 from .reading import Reading, combined
 from .shadow import Shadow, shadow

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..arrays.checks import check_each, check_kind, given_by_name, is_list, is_number
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import InputError, NoEquilibriumError
 from ..minimum.linear_algebra import one_blas_thread
 from ..objects.fabric import Fabric

@@ -11,6 +11,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays.types import Array
 from ..errors import InputError
 from ..mesh import TriangleMesh
 from ..motion.equilibrium import Equilibrium, equilibrium
@@ -18,7 +19,7 @@ from ..objects.cloth import Cloth, add_cloth
 from ..objects.fabric import Fabric
 from ..objects.laws import Stiffening
 from ..quantities.quantities import Term
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 
 _HALVINGS = 40
 

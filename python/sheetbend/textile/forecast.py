@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_count, finite, is_list, is_number
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import InputError
 from ..quantities.wording import short
 from ..report.tables import Section, plain_section

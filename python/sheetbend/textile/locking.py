@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..objects.fabric import Fabric
 from ..objects.laws import Spline
 from ..optional import require

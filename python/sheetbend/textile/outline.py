@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..arrays.checks import finite
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import InputError, RecordingError
 from ..files.door import bounded_bytes, reading
 from ..files.units import METERS

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays.types import Array
 from ..mesh import grid
 from ..motion.equilibrium import Equilibrium
 from ..objects.cloth import Cloth
 from ..objects.fabric import Fabric
 from ..quantities.quantities import Term
-from ..scene.scene import Array, Scene
+from ..scene.scene import Scene
 from .arguments import check_specimen
 from .flat import flat_rest, jaw, specimen
 from .reading import Reading, combined

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scene.scene import Array
+from ..arrays.types import Array
 
 RAYS = 720
 

@@ -14,7 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 
 _NEAREST = 1e-9  # of the limit strain: closer to it no load is finite
 _STEPS, _CLOSE = 60, 1e-10  # of Newton's method for the logarithm of a load

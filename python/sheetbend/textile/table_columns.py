@@ -9,7 +9,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from ..arrays.timeseries import Array
+from ..arrays.types import Array
 from ..errors import InputError, RecordingError
 from .table_text import TextTable
 from .units import EXAMPLES, Unit, unit

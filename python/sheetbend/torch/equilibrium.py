@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from .. import _core
+from ..arrays.types import Array
 from ..errors import NoEquilibriumError, SceneError, refusal
 from ..motion.core_terms import forces_by_group, pressures_by_volume
 from ..motion.equilibrium import whole_start
@@ -18,8 +19,6 @@ from ..scene.scene import Scene
 from .compiled import not_traced
 from .function import respond
 from .inputs import InputMap, dtype_of
-
-Array = np.ndarray
 
 
 class Equilibrium(NamedTuple):

@@ -19,12 +19,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NoReturn, Protocol
 
-import numpy as np
 import torch
 from torch import Tensor
 from torch.autograd import Function
 
-Array = np.ndarray
+from ..arrays.types import Array
 
 
 class Response(Protocol):

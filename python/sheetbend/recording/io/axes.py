@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays.timeseries import Array
+from ...arrays.types import Array
 
 Order = tuple[int, int, int]
 """Numbers of the axes that hold frames, markers and coordinates."""

@@ -17,12 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays.types import Array
 from ...errors import RecordingError
 from ...files.units import METERS
 from ..marker_data import MarkerData
 from .lost import without_zeros
-
-Array = NDArray[np.float64]
 
 _BLOCK = 512
 _KEY = 0x50

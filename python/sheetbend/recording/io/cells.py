@@ -10,7 +10,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from ...arrays.timeseries import Array
+from ...arrays.types import Array
 from ...errors import RecordingError
 from .lost import without_zeros
 

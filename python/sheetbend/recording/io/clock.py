@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...arrays.timeseries import Array
+from ...arrays.types import Array
 from .cells import Row, number, refuse
 
 _WORDS = "times?|time[ _]?stamps?|t|zeit|temps|tiempo|tempo|tijd|czas|время|时间|時間"

@@ -35,7 +35,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...arrays.timeseries import Array
+from ...arrays.types import Array
 from ...errors import RecordingError
 from ...files.door import check_room
 from ...files.whole import written

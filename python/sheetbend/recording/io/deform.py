@@ -25,7 +25,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays.timeseries import Array
+from ...arrays.types import Array
 from ...errors import RecordingError
 from ...files.door import check_room
 from ...files.whole import written

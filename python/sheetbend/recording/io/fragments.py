@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...arrays.timeseries import Array
+from ...arrays.types import Array
 
 LONGEST = 0.5  # s, for which a marker is lost, at most
 LED = 0.05  # s, over which a speed is taken

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arrays.timeseries import Array
+from ...arrays.types import Array
 
 FRAMES = 20  # at least: fewer do not tell
 FAR = 0.1  # of the extent of all markers: how far a marker stays from the origin that is never there

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays.timeseries import Array
+from ...arrays.types import Array
 from ...errors import RecordingError
 from ...files.units import METERS
 from ..marker_data import MarkerData

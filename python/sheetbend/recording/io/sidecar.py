@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays.timeseries import Array
+from ...arrays.types import Array
 from ...errors import RecordingError
 from ...files.door import note
 from ...files.json_file import check_depth, json_content
