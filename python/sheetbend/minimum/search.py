@@ -221,9 +221,8 @@ def _finite(cost: float) -> float | None:
 def fitted_window(part: FitProblem, u: np.ndarray, tolerance: float) -> Approach:
     """At a minimum of a window, searched from u; its cost is infinite where the window has no answer there."""
     walk = Approach(part, u)
-    while walk.iterations < STEPS and walk.step():
-        if walk.promised < tolerance or walk.taken < tolerance:
-            break
+    for _ in walk.steps(STEPS, tolerance):
+        pass
     return walk
 
 
@@ -345,10 +344,8 @@ class _Way:
         less than the tolerance of the search is not taken: it would cost a Jacobian where it ends."""
         if window is None:
             walk.enough = max(LEAST, self.search.tolerance)
-        while walk.iterations < most and not (window is None and walk.near) and walk.step():
+        for _ in walk.steps(most, tolerance, lambda: window is None and walk.near):
             self._arrived(walk, window)
-            if walk.promised < tolerance or walk.taken < tolerance:
-                break
 
     def _arrived(self, walk: Approach, window: float | None) -> None:
         self.u = walk.u
