@@ -351,13 +351,20 @@ def test_microseconds(tmp_path: Path, micro: str) -> None:
 
 
 def test_axes_without_names_are_refused(tmp_path: Path) -> None:
-    """Two markers whose names nothing tells, and a title that begins like a header."""
+    """Two markers whose names nothing tells."""
     (tmp_path / "take.csv").write_text("t;x;y;z;x;y;z\n0;1;2;3;4;5;6\n")
     with pytest.raises(RecordingError, match="twice"):
         Recording.load(tmp_path / "take.csv")
-    (tmp_path / "take.csv").write_text("measured by hand\ntime;day\n0;1\n")
-    with pytest.raises(RecordingError, match="line 1: must be a header whose first column is time"):
-        Recording.load(tmp_path / "take.csv")
+
+
+@pytest.mark.parametrize("title", ["Test 7", "Test 7;", "Time;12:00\nSensor;laser 1", "Time\n12:00\n\nSensor: laser 1"])
+@pytest.mark.parametrize("units", ["Zeit [s];Weg [mm]", "Zeit;Weg\ns;mm"], ids=["in one row", "below"])
+def test_one_column_below_a_title(tmp_path: Path, title: str, units: str) -> None:
+    """The header below a title had to have four cells, and a title that begins with a time was taken for the header."""
+    (tmp_path / "take.csv").write_text(f"{title}\n{units}\n0,00;1,5\n0,01;2,5\n")
+    got = Recording.load(tmp_path / "take.csv")
+    assert got.markers == ("Weg",) and got.times.tolist() == [0.0, 0.01]
+    assert got.positions[:, 0, 2] == pytest.approx([1.5e-3, 2.5e-3])
 
 
 @pytest.mark.parametrize(

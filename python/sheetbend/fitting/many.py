@@ -15,10 +15,11 @@ from ..arrays.types import Array
 from ..errors import InputError, SheetbendError
 from ..experiment.experiment import Experiment
 from ..experiment.wanted import ParameterLike, as_parameters
-from ..minimum.blocks import Arrow, ManyApproach, ManyProblem, reduced
+from ..minimum.arrow import Arrow, reduced
 from ..minimum.counts import counted
 from ..minimum.journal import journaled
 from ..minimum.linear_algebra import one_blas_thread
+from ..minimum.many import ManyApproach, ManyProblem
 from ..minimum.progress import Progress
 from ..minimum.workers import shared_out
 from ..optional import require
@@ -26,8 +27,7 @@ from ..quantities.parameters import Parameter, Parameters
 from ..report.many import ManyFit, OwnParameter
 from ..result.estimate import Estimate
 from ..statistics.gauge import RANK_TOLERANCE, NullSpace, null_space
-from ..statistics.intervals import at_far_limit, clipped, closed_estimate, linear_ends, open_estimate
-from ..statistics.judge import LEVEL
+from ..statistics.intervals import at_far_limit, clipped, closed_estimate, critical_t, linear_ends, open_estimate
 from .experiments import listed, within
 
 FEWEST = 20  # recordings
@@ -153,7 +153,7 @@ def _shared(
     stretch = np.maximum(1.0 / ratio, 1.0)
     matrix = np.zeros((len(names), len(names)))
     matrix[np.ix_(columns, columns)] = clustered * np.outer(stretch, stretch)
-    t = float(require("scipy.special", "fit").stdtrit(count - 1, 0.5 + LEVEL / 2))
+    t = critical_t(count - 1)
     estimates = [
         _estimate(p, float(at[k]), t * math.sqrt(matrix[k, k]), space, k, columns) for k, p in enumerate(parameters)
     ]

@@ -18,8 +18,8 @@ from ..minimum.problem import FitProblem
 from ..motion.simulate import simulate
 from ..objects.markers import Place
 from ..objects.rod import Rod
-from ..optional import require
 from ..recording.recording import Recording
+from ..statistics.intervals import critical_t
 from .model import NAME
 
 
@@ -57,8 +57,7 @@ def offset_reach(problem: FitProblem, u: Array, beside: Sequence[tuple[float, fl
     size = float(np.linalg.norm(constant) / np.linalg.norm(left))
     # a size from few offsets is itself uncertain (Satterthwaite)
     degrees = np.square(left).sum() ** 2 / np.square(left.T @ left).sum()
-    t = float(require("scipy.special", "fit").stdtrit(degrees, 0.975))
-    reach = t * size * np.linalg.norm(moved, axis=1)
+    reach = critical_t(degrees) * size * np.linalg.norm(moved, axis=1)
     end = problem.parameters.to_physical(u + reach)
     return {name: end[name] - values[name] for name in problem.parameters.free}
 

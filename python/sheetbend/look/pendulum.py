@@ -14,7 +14,8 @@ from ..arrays.timeseries import default_max_gap, interpolate
 from ..arrays.types import Array
 from ..errors import RecordingError
 from ..statistics.white_noise import white_variance
-from .seen import RIGID, Seen
+from .decay import Decay, decay
+from .seen import RIGID, Seen, all_around
 from .swing import Moments, Swing, moments
 from .take import Description, Measured, Take
 from .text import joined, table
@@ -36,6 +37,7 @@ KINDS = {1: "a pendulum", 2: "a double pendulum", 3: "a triple pendulum"}
 FITTED, PREDICTED = 4, 4  # pieces
 LEAD = 0.1  # s, at the beginning of a predicted piece, that its start is fitted to
 SMOOTH = 0.1  # s, that angles are smoothed over
+LEAST_LOSS = 1e-4  # N m over a power of rad/s, that a fit begins with, of an arm of 1 kg m^2
 LEAST_VISCOSITY = 1e-4  # N m s/rad, that a fit begins with, where the first arm weighs 1 kg
 SUBSTEP = 1 / 1600  # s, at most
 LEAST_FRAMES = 20
@@ -64,12 +66,6 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         "masses: the motion shows only their ratios. One of them is set to 1 kg (or 1 kg m^2), and the others are "
         "relative to it"
     ]
-    if len(arms) == 1:
-        unknown.append(
-            "how its hinge loses energy: dry friction and the drag of air are fitted, and a viscous hinge looks like a "
-            "mixture of both. Then arm_friction is too large: in an example 0.020 for 0.007 N m, without a warning. "
-            "Compare a fit with `viscosity` in [[scene.pendulum]] and [parameters.arm_hinge_viscosity]"
-        )
     if len(arms) > 1:
         unknown.append("how the arms that hang share a mass at their hinges: it moves like a part of either one")
     apart = max(_drift(s, a, b) for a, b in pairwise(joints))
@@ -89,26 +85,29 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
             f"by {1.0 + stretch:.4f}"
         )
     pieces, swing = _pieces(s, takes[0], len(arms)), _swing(x, r.times, joints)
+    known = decay(swing, SMOOTH) if len(arms) == 1 else _moments(s, swing, pieces, radii)
+    unknown += [known.words()] if isinstance(known, Decay) else []
     # The plane is y = 0: elsewhere rounding moves the arms out of it, and the fold of their triangles grows.
     pivot = (np.nanmean(x[:, joints[0]], axis=0) * (1.0, 0.0, 1.0)).tolist()
     step = float(np.median(np.diff(r.times)))
     lines = takes[0].scene_lines + table("[solver]", {"substeps": max(1, int(np.ceil(step / SUBSTEP - 1e-9)))})
-    if len(arms) == 1:
-        lines += _point_mass(pivot, radii[0])
+    if isinstance(known, Decay):
+        lines += _point_mass(pivot, radii[0], known)
     else:
-        lines += _arms(arms, pivot, radii, _moments(s, swing, pieces, radii))
+        lines += _arms(arms, pivot, radii, known)
     lines += _markers(arms, names[1:], radii)
     lines += _recordings(s, swing, pieces, arms, names[1:], radii)
-    for name, entries in _parameters(arms, radii).items():
+    for name, entries in _parameters(arms, radii, known).items():
         lines += table(f"[parameters.{name}]", entries)
     if len(arms) > 2:
         lines += table("[fit]", {"profiles": False}, {"profiles": "true follows each number, which takes long"})
     return Description(KINDS[len(arms)], notes, unknown, lines)
 
 
-def _point_mass(pivot: list[float], radius: float) -> list[str]:
+def _point_mass(pivot: list[float], radius: float, lost: Decay) -> list[str]:
     """The table of a single arm."""
-    entries = {"name": "arm", "length": radius, "mass": 1.0, "pivot": pivot, "friction": 1e-3, "drag": 1e-4}
+    torques = {key: max(value, LEAST_LOSS) * radius**2 for key, value in lost.torques.items()}
+    entries = {"name": "arm", "length": radius, "mass": 1.0, "pivot": pivot} | torques
     return table("[[scene.pendulum]]", entries, {"length": "of a point mass on a massless arm that swings alike"})
 
 
@@ -143,18 +142,16 @@ def _recordings(
     return lines
 
 
-def _parameters(arms: Sequence[str], radii: Sequence[float]) -> dict[str, dict[str, Any]]:
+def _parameters(arms: Sequence[str], radii: Sequence[float], known: Decay | Moments) -> dict[str, dict[str, Any]]:
     """What is fitted."""
     found: dict[str, dict[str, Any]]
-    if len(arms) == 1:
-        found = {
-            "arm_length": {"lower": 0.2 * radii[0], "upper": 5.0 * radii[0]},
-            "arm_friction": {},
-            "arm_drag": {},
-        }
+    if isinstance(known, Decay):
+        found = {"arm_length": {"lower": 0.2 * radii[0], "upper": 5.0 * radii[0]}}
+        found |= {f"arm_{'hinge_' * (key == 'viscosity')}{key}": {} for key in known.torques}
     else:
         found = {f"{arm}_{key}": {} for arm in arms for key in ("first_moment", "inertia")}
         del found["upper_inertia"]  # the scale of all masses
+        found["upper_first_moment"]["lower"] = 1.0001 * known.inertia[0] / radii[0]  # see `add_arm`
         found |= {f"{arm}_{loss}": {} for loss in ("friction", "hinge_viscosity") for arm in arms}
         found["lower_drag"] = {}
     found |= {f"{arm}_zero": {} for arm in arms}
@@ -324,10 +321,13 @@ def _arms(names: list[str], pivot: list[float], radii: list[float], found: Momen
 
 
 def _swing(x: Array, times: Array, joints: list[int]) -> Swing:
-    """Angles rad from straight down towards +x, and their rates rad/s, smoothed over a moment. Lines bridge gaps."""
-    near = interpolate(times, x[:, joints], times, "linear", default_max_gap(times))
-    known = np.asarray(np.isfinite(near).all(axis=(1, 2)))
-    d = x[:, joints[1:]] - x[:, joints[:-1]]
+    """Angles rad from straight down towards +x, and their rates rad/s, smoothed over a moment. Curves bridge gaps."""
+    places = x[:, joints]
+    places[:, 0] = np.nanmean(places[:, 0], axis=0)
+    near = interpolate(times, places, times, "linear", default_max_gap(times))
+    reach = round(SMOOTH / 2 / float(np.median(np.diff(times))))
+    known = all_around(np.isfinite(near).all(axis=(1, 2))[:, None], reach)[:, 0]
+    d = np.diff(interpolate(times, places, times, "cubic", np.inf), axis=1)
     told = np.arctan2(d[:, :, 0], -d[:, :, 2]).T
     pairs = zip(told, np.isfinite(told), strict=True)
     angles = np.stack([np.interp(times, times[ok], np.unwrap(angle[ok])) for angle, ok in pairs], axis=1)

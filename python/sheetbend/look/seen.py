@@ -256,10 +256,15 @@ def motion_of(recording: Recording) -> tuple[Array, Array]:
         seen = recording.mask[:, k]
         whole[:, k] = np.stack([np.interp(t, t[seen], x[seen, k, axis]) for axis in range(3)], axis=1)
     reach = round(REST / 2 / float(np.median(np.diff(t))))
-    lost = np.cumsum(np.pad(~known, ((reach + 1, reach), (0, 0))), axis=0)
-    known = lost[2 * reach + 1 :] == lost[: -2 * reach - 1]
+    known = all_around(known, reach)
     value, rate = smoothed(t, whole, REST / 2)
     return np.where(known[..., None], value, np.nan), np.where(known[..., None], rate, np.nan)
+
+
+def all_around(known: Array, reach: int) -> Array:
+    """Whether all of so many frames before and after each one are known, of series (frames, markers)."""
+    lost = np.cumsum(np.pad(~known, ((reach + 1, reach), (0, 0))), axis=0)
+    return np.asarray(lost[2 * reach + 1 :] == lost[: -2 * reach - 1])
 
 
 def _up(recording: Recording) -> tuple[int, bool]:

@@ -12,6 +12,7 @@ coordinates of the problem (`coordinates`), in which no step leaves the possible
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -41,7 +42,7 @@ class Tally:
 
 
 class Walked(Protocol):
-    """What a walk asks of a problem: `problem.FitProblem`, or many recordings (`blocks.ManyProblem`)."""
+    """What a walk asks of a problem: `problem.FitProblem`, or many recordings (`many.ManyProblem`)."""
 
     @property
     def parameters(self) -> Parameters: ...
@@ -105,6 +106,17 @@ class Approach:
     def jacobian(self) -> Array | None:
         """(rows, free) where it is, if it was made there."""
         return self._J
+
+    def steps(self, most: int, least: float, arrived: Callable[[], bool] = lambda: False) -> Iterator[None]:
+        """Steps, up to `most` in all, until one promises or takes off less than a share `least` of the cost.
+
+        Args:
+            arrived: whether to stop here; asked before every step.
+        """
+        while self.iterations < most and not arrived() and self.step():
+            yield
+            if self.promised < least or self.taken < least:
+                return
 
     def step(self) -> bool:
         """Go to a lower cost; False where no step inside the limits promises or gives one."""

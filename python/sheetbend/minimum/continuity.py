@@ -24,7 +24,8 @@ from ..optional import require
 from ..quantities.parameters import Parameters
 from ..result.shot import ShotMotion
 from ..statistics.chain import Chain
-from ..statistics.spectral import autocorrelation
+from ..statistics.intervals import LIKELY
+from ..statistics.spectral import effective_deviation
 from .growth import over_fit
 from .journal import leave
 from .lifted import Lifted
@@ -43,7 +44,6 @@ CLOSER = 0.03  # of the gap before: the next one that parameters are fitted with
 ROUNDS = 12  # of gaps
 SETTLED = 0.03  # of the logarithm of a gap's size
 SMALLEST, LARGEST, LOOKED = 1e-6, 1.0, 37  # of the motion's size: gaps that are looked at, and how many
-LIKELY = 3.841  # of twice the logarithm of a likelihood: 95 % of a chi-square with one degree
 
 
 @dataclass(frozen=True)
@@ -240,12 +240,8 @@ class _deviance:
         here = motion.solve(u)
         assert ok and here is not None
         layout = problem.rows_layout()
-        rows = layout.recording == experiment
         taken = motion.absorbed() + len(u)
-        variance = float(r[own] @ r[own]) / max(len(r[own]) - taken, 1.0)
-        lags = autocorrelation(r[own], layout.of(rows))
-        positive = lags[: int(np.argmax(lags <= 0))] if (lags <= 0).any() else lags
-        weight = 1.0 / math.sqrt(max(variance, 1e-300) * (1.0 + 2.0 * float(positive.sum())))
+        weight = 1.0 / effective_deviation(r[own], layout.of(layout.recording == experiment), taken)
         self._windows = [
             replace(w, state=weight * w.state, border=weight * w.border, rest=weight * w.rest)
             for w in motion.fitted(here.seen)

@@ -18,11 +18,11 @@ from ..objects.over_time import OverTime
 from ..objects.stiffness_field import StiffnessField
 from ..result.field import FieldFit
 from ..result.over_time import OverTimeFit
+from ..statistics.intervals import LEVEL
 from .field_priors import Picture
 from .problem import FitProblem
 from .smooth import Field, Modes
 
-LEVEL = 0.95
 HALVINGS = 40  # of the range of half-widths
 FINEST = 0.1  # of the modes
 

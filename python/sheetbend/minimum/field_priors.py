@@ -15,7 +15,8 @@ import numpy as np
 
 from ..arrays.types import Array
 from ..quantities.parameters import Parameters
-from ..statistics.spectral import autocorrelation
+from ..statistics.intervals import LIKELY
+from ..statistics.spectral import effective_deviation
 from .growth import growths
 from .optimizers import walked
 from .parts import expanded_to
@@ -31,7 +32,6 @@ FINER = 4  # times closer, about the best
 SIZES_FOR_EACH = 8  # times as many sizes for each length: they cost next to nothing (`Picture.heights`)
 ROUNDS = 12  # of priors
 SETTLED = 0.03  # of the logarithms of both
-LIKELY = 3.841  # of twice the logarithm of a likelihood: 95 % of a chi-square with one degree
 POSSIBLE = 25.0  # likewise: what is less likely weighs less than 4e-6
 
 
@@ -114,10 +114,7 @@ class Picture:
         for i in range(len(problem.experiments)):
             own = slice(first[i], first[i + 1])
             taken = len(u) * len(r[own]) / max(problem.core.data_rows, 1) + problem.core.absorbed(i)
-            variance = float(r[own] @ r[own]) / max(len(r[own]) - taken, 1.0)
-            lags = autocorrelation(r[own], layout.of(layout.recording == i))
-            positive = lags[: int(np.argmax(lags <= 0))] if (lags <= 0).any() else lags
-            rows[own] /= math.sqrt(max(variance, 1e-300) * (1.0 + 2.0 * float(positive.sum())))
+            rows[own] /= effective_deviation(r[own], layout.of(layout.recording == i), taken)
         of_fields = np.isin(np.arange(len(u)), np.concatenate(columns))
         theirs = prior[0] + np.flatnonzero(problem.parameters.prior_jacobian()[:, of_fields].any(axis=1))
         kept = np.delete(rows, theirs, axis=0)

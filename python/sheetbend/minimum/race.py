@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -156,7 +157,9 @@ def _run(course: Course, item: tuple[Array, tuple[Reference, ...]]) -> Raced:
             last = length == course.lengths[-1]
             if not math.isfinite(walk.cost) or (math.isinf(length) and not last):
                 break
-            _walk(walk, known if last else (), LAST if last else TOLERANCE)
+            near = partial(_in_known, walk, known if last else ())
+            for _ in walk.steps(STEPS, LAST if last else TOLERANCE, near):
+                pass
             u = walk.u
             if last:
                 return Raced(first, u, walk.cost, tally.evaluations, tally.jacobians)
@@ -166,8 +169,6 @@ def _run(course: Course, item: tuple[Array, tuple[Reference, ...]]) -> Raced:
     return Raced(first, u, math.inf, tally.evaluations, tally.jacobians, f"the fit cannot start: {words}")
 
 
-def _walk(walk: Approach, known: Sequence[Reference], tolerance: float) -> None:
-    """Steps until the next promises little, or the walk is near a known end."""
-    while walk.iterations < STEPS and not any(end.holds(walk.u, walk.cost) for end in known):
-        if not walk.step() or walk.promised < tolerance or walk.taken < tolerance:
-            return
+def _in_known(walk: Approach, known: Sequence[Reference]) -> bool:
+    """Whether the walk is in the minimum of a known end."""
+    return any(end.holds(walk.u, walk.cost) for end in known)

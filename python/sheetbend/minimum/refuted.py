@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays.types import Array
-from ..statistics.spectral import autocorrelation
+from ..statistics.spectral import frames_alike
 from .problem import FitProblem
 
 CLEAR = 3.0  # standard deviations
@@ -34,9 +34,7 @@ def refuted(problem: FitProblem, u: Array, there: Array) -> bool:
     lost, apart = float(q @ q - r @ r), float((q - r) @ (q - r))
     if lost <= 0.0:
         return False
-    alike = autocorrelation(r, problem.rows_layout())
-    until = np.flatnonzero(alike < _ALIKE)
-    frames = 1.0 + 2.0 * float(alike[: until[0] if len(until) else len(alike)].sum())
+    frames = frames_alike(r, problem.rows_layout(), _ALIKE)
     return lost + apart > CLEAR * 2.0 * float(np.sqrt(frames * (r @ r) / rows * apart))
 
 

@@ -106,10 +106,8 @@ def through(whole: FitProblem, lengths: Sequence[float], u: np.ndarray, observe:
     for length, walk in along(whole, [*lengths, math.inf], u, Tally()):
         if math.isinf(length):
             return walk.u
-        while walk.iterations < STEPS and walk.step():
+        for _ in walk.steps(STEPS, TOLERANCE):
             observe(Progress(walk.iterations, walk.cost, walk.u.copy(), length))
-            if walk.promised < TOLERANCE or walk.taken < TOLERANCE:
-                break
     raise AssertionError("the whole motion comes last")
 
 

@@ -131,7 +131,7 @@ def add_rod(
         GA: shear stiffness N, shear coefficient times G times the section's area (5/6 G A for a rectangle: Timoshenko);
             None = sections stay across the rod. A grip holds the section, and the link next to it may lean against it.
         points: (k, 3) m, the initial shape, resampled to equal links and fitted to the length; straight from the start
-            otherwise.
+            otherwise. They stay where a fit changes the length: see `add_rope`.
         velocity: (k, 3) m/s at `points`; at rest by default.
         start, end: how the ends are held; None = free. A point of a body (`Body.point`) holds the end there, as a ball
             joint or, where it has a direction `along` (the rod's direction of travel), firmly. A `Junction` holds the

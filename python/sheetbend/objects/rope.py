@@ -139,7 +139,8 @@ def add_rope(
         EI: bending stiffness N m^2; None = no bending.
         start: (3,) m, where a straight initial shape begins; a `grip_end` alone moves it, so that the rope ends there.
         direction: (3,), of a straight initial shape; that of `clamp_start`, or else `clamp_end`, or x by default.
-        points: (k, 3) m, an initial shape instead, resampled to equal links.
+        points: (k, 3) m, an initial shape instead, resampled to equal links. It stays where a fit changes the length:
+            rigid links then jump to their length in the first substep. Give `EA` or start at rest (`sb.equilibrium`).
         velocity: (k, 3) m/s at `points`, which are then fitted to the length; at rest by default.
         stretch_damping, bend_damping: Kelvin-Voigt time constants s: the damping moment is EI times the constant times
             the rate of curvature.

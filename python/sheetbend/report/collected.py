@@ -15,13 +15,13 @@ from ..errors import InputError
 from ..quantities.wording import short
 from ..result.estimate import Estimate
 from ..result.result import FitData
+from ..statistics.intervals import NORMAL
 from ..statistics.population import Population, population
 from .report_recordings import SELDOM
 from .tables import Section, plain_section
 
 COUNTED = ("identified", "weak")  # verdicts of estimates that a population is made from
 FEWEST = 3
-QUANTILE = 1.959963984540054  # of the normal distribution, half-width over standard deviation
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ class Collected:
             p = trait.found
             if p is None:
                 continue
-            reach = 4.0 * (p.spread + (p.mean_interval[1] - p.mean) / QUANTILE)
+            reach = 4.0 * (p.spread + (p.mean_interval[1] - p.mean) / NORMAL)
             inverse = math.exp if trait.log else float
             ends = [repr(inverse(x)) for x in (p.mean - reach, p.mean + reach, p.mean)]
             to.writerow((trait.name, "log" if trait.log else "lin", *ends, 1))
@@ -192,5 +192,5 @@ def errors_of(e: Estimate, log: bool) -> tuple[float, float]:
     """Value and standard deviation of an estimate with both ends, of its logarithm if wanted."""
     ends: Sequence[float] = (e.lower or 0.0, e.upper or 0.0)
     if log:
-        return math.log(e.value), (math.log(ends[1]) - math.log(ends[0])) / (2 * QUANTILE)
-    return e.value, (ends[1] - ends[0]) / (2 * QUANTILE)
+        return math.log(e.value), (math.log(ends[1]) - math.log(ends[0])) / (2 * NORMAL)
+    return e.value, (ends[1] - ends[0]) / (2 * NORMAL)

@@ -28,6 +28,7 @@ from ..arrays.types import Array
 from ..optional import require
 from .covariance import Covariance, Sandwich
 from .gauge import null_space
+from .intervals import critical_t
 from .layout import Integers
 from .least_squares import solved
 from .linearized import Linearized
@@ -153,9 +154,7 @@ def _compared(fitted: Linearized, split: Split) -> Contradiction | None:
     moved[physical] = solved(every[:, physical], known, rcond=None)
     full, whole = np.zeros(every.shape[1]), np.zeros((every.shape[1], every.shape[1]))
     full[used], whole[np.ix_(used, used)] = step, V
-    return _by_parameter(
-        chance, split, shared, full, whole, moved, float(require("scipy.special", "fit").stdtrit(degrees, 0.975))
-    )
+    return _by_parameter(chance, split, shared, full, whole, moved, critical_t(degrees))
 
 
 def _opposed(fitted: Linearized, split: Split) -> Array:

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import overload
 
+import numpy as np
+
+from ..arrays.types import Array
+from ..optional import require
 from ..quantities.parameters import Parameter
 from ..quantities.wording import width_words
 from ..result.estimate import Estimate
@@ -11,11 +16,29 @@ from .profile import FARTHEST, Ends
 
 IDENTIFIED = 0.2
 """Largest 95 % half-width of an identified parameter, as a part of its value (or of its scale)."""
+LEVEL = 0.95
+"""Of all intervals."""
 NORMAL = 1.959963984540054
 """Standard deviations of half a 95 % interval, of what is normally distributed."""
+LIKELY = 3.841
+"""What minus twice a logarithmic likelihood rises by at the ends of a 95 % interval (chi-square with one degree)."""
 RAN_OFF = math.log(1e3)
 """On a log scale: a parameter that a fit moved so far from its start, and that data do not see there, ran off."""
 _NEAR = 1e-3  # of a logarithm: so near the farthest that a search looks
+
+
+@overload
+def critical_t(degrees: float) -> float: ...
+
+
+@overload
+def critical_t(degrees: Array) -> Array: ...
+
+
+def critical_t(degrees: float | Array) -> float | Array:
+    """Standard errors of half a 95 % interval, of what follows Student's t."""
+    t = require("scipy.special", "fit").stdtrit(degrees, 0.5 + LEVEL / 2)
+    return np.asarray(t) if isinstance(degrees, np.ndarray) else float(t)
 
 
 def known(parameter: Parameter, value: float, lower: float, upper: float) -> tuple[str, str]:

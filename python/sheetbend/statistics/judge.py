@@ -9,16 +9,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays.types import Array
-from ..optional import require
 from ..quantities.parameters import Parameter, Parameters
 from ..quantities.wording import figures, floor_words, quantity, ran_off_words, side_words
 from ..result.estimate import Correlation, Estimate
 from .body_numbers import BodyNumbers, in_ten_numbers
 from .covariance import Covariance, covariance
-from .gauge import Gauge, null_space
+from .gauge import RANK_TOLERANCE, Gauge, null_space
 from .intervals import (
     at_far_limit,
     clipped,
+    critical_t,
     half_width,
     has_answer,
     is_precise,
@@ -32,7 +32,6 @@ from .layout import Layout
 from .profile import FARTHEST, NOISELESS, Ends, Profile, Wanted
 from .shared_errors import variance_of, with_shared
 
-LEVEL = 0.95
 MANY = 60  # parameters: of more, such as the private ones of many recordings, only weak ones are profiled
 _AT_BOUND = 1e-6
 _ROUNDING = 1e-14
@@ -102,20 +101,18 @@ class Judge:
         residuals: Array,
         jacobian: Array,
         layout: Layout | None,
-        tolerance: float,
         nuisance: Nuisance,
         errors: Array,
         limits: Mapping[str, str],
         fixes: Mapping[tuple[str, str], str],
-        bodies: Sequence[BodyNumbers] = (),
+        bodies: Sequence[BodyNumbers],
     ) -> None:
         self.parameters, self.internal, self.limits, self.fixes = parameters, internal, limits, fixes
-        self.quantile = require("scipy.special", "fit").stdtrit
         names, log = parameters.free, [parameters[name].log for name in parameters.free]
         data = np.vstack([jacobian, nuisance.jacobian])
         self.rows = np.vstack([data, parameters.prior_jacobian()])
-        self.space = null_space(self.rows, names, log, tolerance)
-        seen_by_data = null_space(data, names, log, tolerance).determined
+        self.space = null_space(self.rows, names, log, RANK_TOLERANCE)
+        seen_by_data = null_space(data, names, log, RANK_TOLERANCE).determined
         prior = self.rows[len(jacobian) :]
         self.by_prior = set(self.space.determined) - set(seen_by_data)
         lower, upper = parameters.bounds()
@@ -165,7 +162,7 @@ class Judge:
         index = columns.index(column)
         known_part, whole = (self.driven if near else self.wide_driven)[index, index], spread.matrix[index, index]
         shaken = min(float(known_part / whole), 1.0) if whole > 0 else 0.0  # of the variance
-        t = float(self.quantile(spread.degrees[index], 0.5 + LEVEL / 2))
+        t = critical_t(float(spread.degrees[index]))
         reach = t * math.sqrt(spread.matrix[index, index])
         if reach <= _ROUNDING * max(abs(self.internal[column]), 1.0) and spread.residual_variance > 1:
             words = "its interval would be narrower than rounding: no motion tells a parameter so well"
@@ -271,7 +268,7 @@ class Judge:
                     row[self.columns.index(member)] = weight
             exponent = self.internal[column] - power * self.internal[columns[0]]
             degrees = min(self.spread.degrees[self.columns.index(member)] for member in varied)
-            reach = float(self.quantile(degrees, 0.5 + LEVEL / 2)) * math.sqrt(row @ self.spread.matrix @ row)
+            reach = critical_t(float(degrees)) * math.sqrt(row @ self.spread.matrix @ row)
             if reach > FARTHEST or abs(exponent) > _LARGEST:
                 return gauge
             value = math.exp(exponent)

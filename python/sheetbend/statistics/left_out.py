@@ -24,6 +24,7 @@ from ..arrays.types import Array
 from ..optional import require
 from .blocks import Split, independent, short_of_frames
 from .covariance import covariance
+from .intervals import NORMAL, critical_t
 from .least_squares import solved
 from .linearized import Linearized
 from .shared_errors import variance_of
@@ -88,8 +89,7 @@ def left_out(fitted: Linearized, split: Split) -> tuple[LeftOut, ...]:
             if not elsewhere[c]:
                 continue
             degrees = max(float(spread.degrees[i] / (2 - 1 / spread.inflation[i])), 1.0)
-            t = float(require("scipy.special", "fit").stdtrit(degrees, 0.975))
-            reach = t * math.sqrt(max(float(V[i, i]), 0.0))
+            reach = critical_t(degrees) * math.sqrt(max(float(V[i, i]), 0.0))
             steps.setdefault(c, []).append(float(step[i]))
             found = LeftOut(shared[c], name, float(step[i]), reach, float(np.abs(moved[i]).sum()))
             if c not in most or abs(found.step) * most[c].reach > abs(most[c].step) * found.reach:
@@ -106,4 +106,4 @@ def _scattered(steps: Array) -> tuple[float, float]:
     special, degrees = require("scipy.special", "fit"), len(steps) - 1
     sd = math.sqrt(degrees / len(steps) * float(((steps - steps.mean()) ** 2).sum()))
     least = sd * math.sqrt(degrees / float(special.chdtri(degrees, SURE)))
-    return float(special.stdtrit(degrees, 0.975)) * sd, float(special.ndtri(0.975)) * least
+    return critical_t(degrees) * sd, NORMAL * least

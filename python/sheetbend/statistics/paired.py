@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays.types import Array
-from ..optional import require
+from .intervals import critical_t
 
 FEWEST = 4  # independent stretches below which no interval is given
 MOST = 24  # stretches of one recording
@@ -71,7 +71,7 @@ def paired(series: Sequence[tuple[Array, Array]]) -> Paired:
     if n >= FEWEST:
         without = np.array([log_ratio(sums.sum(axis=0) - own) for own in sums])
         error = math.sqrt((n - 1) / n * float(((without - without.mean()) ** 2).sum()))
-        reach = float(require("scipy.special", "fit").stdtrit(n - 1, 0.975)) * error
+        reach = critical_t(n - 1) * error
         lower, upper = math.exp(value - reach), math.exp(value + reach)
     rms = (math.sqrt(first / count), math.sqrt(second / count))
     worse = sum(int((b > a).sum()) for a, b in series) / int(count)

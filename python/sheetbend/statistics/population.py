@@ -17,8 +17,8 @@ import numpy as np
 from ..arrays.types import Array
 from ..errors import InputError
 from ..optional import require
+from .intervals import LEVEL, critical_t
 
-LEVEL = 0.95
 _WIDEST = 1e3  # of the standard deviation of the estimates: where the upper end of tau is looked for
 
 
@@ -76,7 +76,7 @@ def population(values: Array, variances: Array) -> Population:
     best = optimize.minimize_scalar(deviance, bounds=ends, method="bounded", options={"xatol": 1e-10})
     tau2 = 0.0 if start == 0 else math.exp(float(best.x))
     w, mean, Q = weighed(tau2)
-    reach = float(special.stdtrit(n - 1, 0.5 + LEVEL / 2)) * math.sqrt(max(Q / (n - 1), 1.0) / float(w.sum()))
+    reach = critical_t(n - 1) * math.sqrt(max(Q / (n - 1), 1.0) / float(w.sum()))
 
     def end(probability: float) -> float:
         """tau^2 at which Q is that quantile of chi square; 0 where it is below at once."""

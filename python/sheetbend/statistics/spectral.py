@@ -7,6 +7,8 @@ leave.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ..arrays.types import Array
@@ -89,3 +91,21 @@ def autocorrelation(residuals: Array, layout: Layout) -> Array:
     grid = RowGrid(layout, residuals)
     sums = grid.lags((np.abs(grid.transform(grid.residuals)) ** 2).sum(1), min(_MAX_ORDER, grid.frames // 2))
     return np.asarray(sums[1:] / sums[0])
+
+
+def frames_alike(residuals: Array, layout: Layout, least: float = 0.0) -> float:
+    """How many frames of residuals count as one, by the correlation before the first lag at which it is `least` or
+    less."""
+    lags = autocorrelation(residuals, layout)
+    apart = np.flatnonzero(lags <= least)
+    return 1.0 + 2.0 * float(lags[: apart[0] if len(apart) else len(lags)].sum())
+
+
+def effective_deviation(residuals: Array, layout: Layout, taken: float) -> float:
+    """What residuals are divided by to count as independent ones of unit variance in a sum of squares.
+
+    Args:
+        taken: degrees of freedom that a fit took of them.
+    """
+    variance = float(residuals @ residuals) / max(len(residuals) - taken, 1.0)
+    return math.sqrt(max(variance, 1e-300) * frames_alike(residuals, layout))

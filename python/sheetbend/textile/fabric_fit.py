@@ -20,7 +20,7 @@ from ..quantities.wording import figures, short
 from ..report.tables import Section, plain_section
 from ..result.estimate import Estimate
 from ..statistics.gauge import null_space
-from ..statistics.intervals import NORMAL, closed_estimate, open_estimate
+from ..statistics.intervals import NORMAL, closed_estimate, critical_t, open_estimate
 from .reading import Reading
 
 _UNITS = {"density": "kg/m^2", "warp": "N/m", "weft": "N/m", "shear": "N/m", "poisson": ""} | dict.fromkeys(
@@ -339,7 +339,7 @@ def _half_widths(
     few = scattered > 0.0
     quantile = np.full(len(every), NORMAL)
     if few.any():
-        quantile[few] = require("scipy.special", "fit").stdtrit(every[few] ** 2 / scattered[few], 0.975)
+        quantile[few] = critical_t(every[few] ** 2 / scattered[few])
     return np.asarray(quantile * np.sqrt(every))
 
 

@@ -14,11 +14,10 @@ import numpy as np
 
 from ..arrays.types import Array
 from ..errors import InputError
-from ..optional import require
 from ..quantities.parameters import Parameter
 from ..result.estimate import Estimate
 from ..statistics.covariance import covariance
-from ..statistics.intervals import closed_estimate
+from ..statistics.intervals import closed_estimate, critical_t
 from .curve import Curve
 
 _TRIALS = 60  # distances of a round; each round looks closer about the best of the last
@@ -129,5 +128,4 @@ def _reach(load: Array, x: Array, found: tuple[float, float, float], offset: flo
     size = float(np.abs(load).max())
     per = (stiffness * (x - share * slid), -stiffness * slid, -stiffness * share * distance * by_distance)
     told = covariance(left / size, np.column_stack([*per, np.full(len(x), size)]) / size)
-    t = require("scipy.special", "fit").stdtrit(told.degrees, 0.975)
-    return [float(v) for v in (t * np.sqrt(np.diag(told.matrix)))[:3]]
+    return [float(v) for v in (critical_t(told.degrees) * np.sqrt(np.diag(told.matrix)))[:3]]

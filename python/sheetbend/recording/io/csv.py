@@ -132,13 +132,13 @@ def _before_time(header: list[str]) -> bool:
     return _FRAME.fullmatch(header[0]) is not None and clock.unit(header[1]) is not None
 
 
-def _begins(line: str) -> int:
-    """How many cells of a line are filled if it begins with a time, or with a frame before one; else 0."""
+def _begins(line: str) -> bool:
+    """Whether a line begins with the name of a time, or with that of a frame before one."""
     for delimiter in _DELIMITERS:
-        cells = [cell.strip() for cell in line.split(delimiter)]
-        if clock.unit(cells[0].strip('"')) is not None or (len(cells) > 1 and _before_time(cells)):
-            return sum(map(bool, cells))
-    return 0
+        cells = [cell.strip().strip('"') for cell in line.split(delimiter)]
+        if len(cells) > 1 and (clock.unit(cells[0]) is not None or _before_time(cells)):
+            return True
+    return False
 
 
 def _delimiter(path: Path, number: int, header: str) -> str:

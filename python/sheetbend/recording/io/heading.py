@@ -5,8 +5,7 @@
     Time;X;Y;Z;X;Y;Z                         the header
     ms;mm;mm;mm;mm;mm;mm                     units
 
-The first row is the header where it begins with the name of a time; below a title, the first row does that also names
-three columns at least.
+The header is the first row that begins with the name of a time and has numbers below it, or below a row of units.
 """
 
 from __future__ import annotations
@@ -20,21 +19,21 @@ from .cells import Row
 
 MOST = 30
 """Rows above the header."""
+_NUMBER = re.compile(r'["\s]*[-+]?[.,]?\d')  # a line that begins with one
 _BARE = re.compile(r"[\[(]?\s*([^\s\[\]()]*)\s*[\])]?")
 _TIMES = {"s", *clock.PER_SECOND}
 
 
-def first(rows: Sequence[tuple[int, str]], begins: Callable[[str], int]) -> int:
+def first(rows: Sequence[tuple[int, str]], begins: Callable[[str], bool]) -> int:
     """Which of the lines is the header; the first one where none is.
 
     Args:
         rows: numbers and texts of lines.
-        begins: how many cells of a line are filled if it begins as a header does, else 0.
+        begins: whether a line begins as a header does.
     """
-    if not begins(rows[0][1]):
-        for k, (_, line) in enumerate(rows[1:MOST], start=1):
-            if begins(line) > len(columns.AXES):
-                return k
+    for k, (_, line) in enumerate(rows[:MOST]):
+        if begins(line) and any(_NUMBER.match(below) for _, below in rows[k + 1 : k + 3]):
+            return k
     return 0
 
 
