@@ -6,7 +6,19 @@ import difflib
 import reprlib
 from collections.abc import Collection
 
-_short = reprlib.Repr()
+
+
+class _Short(reprlib.Repr):
+    """Values as messages show them."""
+
+    def repr_int(self, x: int, level: int) -> str:
+        try:
+            return super().repr_int(x, level)
+        except ValueError:  # Python writes no more than 4,300 digits; TOML reads any number of hexadecimal ones
+            return f"an integer of {x.bit_length()} bits"
+
+
+_short = _Short()
 _short.maxstring = _short.maxother = 120
 
 

@@ -359,6 +359,7 @@ TOML = {
     "parts of a table": "[" + "a ." * 100_000 + "b]",
     "quoted parts": "'a'." * 100_000 + "b = 1",
     "digits": "a = " + "1" * 5000,
+    "hexadecimal digits": '[experiment]\nname = "a"\n[[scene.rope]]\nlength = 0x' + "9" * 5000,
     "no text": b"a = '\xff'",
     "large": b"#" * (2**22 + 1),
     "links": '[experiment]\nname = "a"\n[[scene.rope]]\nlength = 1.0\ndensity = 1.0\nsegments = 1000000000',
