@@ -7,6 +7,9 @@
 // Where constraints join them to more, the push moves that too, and has to be larger for the approach to end in (1 + e) of it:
 //
 //   push = (1 + e) |n . w| (1/m1 + 1/m2)/(1/m1 + 1/m2 - n . D n)       D: core/solver/joined_balls.h
+//
+// where the constraints leave enough of the inverse mass to push: more than a fifth of it if they link the two, and anything beyond rounding otherwise
+// (joined_push). Elsewhere the push is that of the masses alone.
 #pragma once
 
 #include <array>

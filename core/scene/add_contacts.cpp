@@ -104,6 +104,11 @@ void add_balls(const std::vector<int>& nodes, const std::vector<char>& held, std
     s.balls.members.push_back({n, {}});
     s.balls.held.push_back(held[n]);
   }
+  for (const Group& g : s.groups)
+    for (const int n : g.stencil)
+      if (g.unilateral && slot[n] >= 0)
+        refuse(field + ": particle " + std::to_string(n) + " is on a tether of " + g.name +
+               ", which impacts would take for slack. Fix: use distance constraints, or leave out the particle");
   for (Bouncer& own : s.bouncers)
     if (slot[own.node] >= 0) s.balls.members[slot[own.node]].contacts = std::move(own.contacts);
   std::erase_if(s.bouncers, [&](const Bouncer& own) { return slot[own.node] >= 0; });

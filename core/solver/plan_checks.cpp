@@ -52,18 +52,17 @@ void expect_no_self_contact(const Scene& scene) {
 // Contact stands in the balance of forces, which implicit substeps find, or is projected between sweeps.
 void expect_no_contact(const Scene& scene) {
   if (!scene.contacts.empty())
-    throw std::invalid_argument(
-        "solver.method: particles of " + scene.contacts.front().name +
-        " may touch a collider, which needs substeps whose forces balance. Fix: use implicit, or "
-        "gauss_seidel for cloth in many short substeps");
+    throw std::invalid_argument("solver.method: this one does not compute contacts, and the scene has the contact " +
+                                scene.contacts.front().name +
+                                ". Fix: use implicit, or gauss_seidel for cloth in many short substeps");
 }
 
 // Sweeps project particles out of colliders.
 void expect_contact_of_particles(const Scene& scene) {
   for (const Contact& contact : scene.contacts)
     if (contact.arity > 1)
-      throw std::invalid_argument("solver.method: points of bodies in " + contact.name +
-                                  " may touch a collider, which sweeps do not project. Fix: use implicit");
+      throw std::invalid_argument("solver.method: gauss_seidel does not compute contacts of bodies, and the contact " +
+                                  contact.name + " has points of one. Fix: use implicit");
 }
 
 // Blocks are made of constraints and what they join.

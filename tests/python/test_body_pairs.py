@@ -49,6 +49,28 @@ def test_a_bar_rests_on_two_ropes_and_draws_them_down():
     assert motion.contacts["self"].most >= 2
 
 
+def test_a_net_with_knots_catches_a_ball():
+    """A ball is a short capsule. Between strings that only lie across each other it would fall through."""
+    scene = sb.Scene("net")
+    for k, at in enumerate((-0.02, 0.0, 0.02)):
+        for name, start, along in ((f"a{k}", (-0.06, at, 0), (1, 0, 0)), (f"b{k}", (at, -0.06, -0.004), (0, 1, 0))):
+            rope = sb.add_rope(
+                scene, name, length=0.12, segments=6, density=0.01, EA=200.0, EI=1e-6, start=start, direction=along,
+                stretch_damping=0.02,
+            )  # fmt: skip
+            scene.pin(rope.particles[[0, -1]])
+    a, b = ([scene.ropes[f"{name}{k}"].particles for k in range(3)] for name in "ab")
+    knots = [[a[i][2 + j], b[j][2 + i]] for i in range(3) for j in range(3)]
+    scene.add_constraints("distance", knots, name="knots", compliance=1e-6)
+    ball = scene.add_body("ball", of=sb.Inertia.ball(0.05, 0.015), at=(0.004, 0.003, 0.02))
+    sphere = ball.capsules([[(0, 0, -1e-4), (0, 0, 1e-4)]])
+    scene.add_self_contact(*scene.ropes.values(), sphere, radius=[*6 * [0.001], 0.015])
+    motion = sb.simulate(scene, [0.0, 0.15, 0.3, 0.45], SOLVER)
+    heights = ball.pose(motion)[0][1:, 2]
+    assert (heights > -0.01).all(), heights
+    assert (heights < 0.015).all(), heights
+
+
 def test_a_bar_lies_on_a_cloth_and_on_another_bar():
     scene = sb.Scene("heap", gravity=(0, 0, -9.81))
     mesh = grid(0.2, 0.2, 4, 4, "one_way")

@@ -345,9 +345,13 @@ def test_balls_that_start_inside_each_other_are_refused(axis: int):
     [
         (lambda s: s.pin([1]), "particle 1 is held"),
         (lambda s: s.drive([1], [0.0, 1.0], np.zeros((2, 1, 3))), "particle 1 is held"),
+        (
+            lambda s: s.add_constraints("tether", [[0, 1]], name="reach", compliance=0.0, rest=1.0),
+            "particle 0 is on a tether of reach",
+        ),
     ],
 )
-def test_what_is_held_does_not_collide(change: Any, words: str):
+def test_what_is_held_or_on_a_tether_does_not_collide(change: Any, words: str):
     scene = cradle()
     change(scene)
     with pytest.raises(sb.SceneError, match=words):

@@ -56,6 +56,14 @@ def test_two_ropes_rest_across_each_other():
     assert middle < free[scene.ropes["lower"].particles[7], 2] - 1e-4  # and presses it down
 
 
+def test_where_forces_do_not_balance_friction_of_pairs_is_named():
+    scene = crossed(0.0101)
+    scene.add_self_contact(radius=0.005, friction=0.3)
+    few = sb.Solver(h=1e-3, method="implicit", iterations=2)
+    with pytest.raises(sb.UnbalancedError, match=r"Fix: leave out the friction between pieces"):
+        sb.simulate(scene, [0.0, 0.1], few)
+
+
 def test_what_is_driven_may_follow_what_flies_ahead():
     """By more than the gap in a substep: where nothing but the hand moved, they would pass through each other."""
     scene = sb.Scene("chase", gravity=(0, 0, 0))
