@@ -35,7 +35,7 @@ void balance_rigid(const DirectBlock& block, IncrementalPotential& potential, Nu
   for (int pass = 0; pass < 2; ++pass) {
     potential.evaluate(block, x);
     if (pass == 0) rigid.factorize(block, x.data());
-    const std::vector<double> more = rigid.balance(block, x.data(), potential.R().data());
+    const std::vector<double> more = rigid.balance(block, x.data(), potential.R().data(), rigid.residuals().data());
     for (std::size_t j = 0; j < more.size(); ++j) rigid.lambda[j] += more[j];
   }
   potential.evaluate(block, x);

@@ -257,7 +257,7 @@ void carry_rigid(const SubstepState<T>& s, const DirectBlock& block, BlockState<
   for (std::size_t i = 0; i < at.size(); ++i) at[i] = value_of(T(state.x[0][i]));
   for (int pass = 0; pass < 2; ++pass) {
     find_first_order(s, block, state, x, R, c);
-    add_rigid(rigid, rigid.balance(block, at.data(), R.data()), state);
+    add_rigid(rigid, rigid.balance(block, at.data(), R.data(), c.data()), state);
   }
 }
 

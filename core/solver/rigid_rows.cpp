@@ -12,7 +12,7 @@ namespace sheetbend {
 namespace {
 
 constexpr int at_row = sheetbend_blocks::row;
-constexpr double gives_way = 1e-10;     // D of a row that does, of J W J^T
+constexpr double gives_way = 1e-4;      // D of a row that does, of J W J^T
 constexpr double softening = 1e-5;      // S, of J diag(K)^-1 J^T
 constexpr std::size_t few = 256;        // rows whose order is kept, as a border of H does (condensed.h)
 constexpr double far_less = 10.0;       // ratio of shares from which a row is exchanged
@@ -58,10 +58,12 @@ void RigidRows::find(const Scene& scene, const Given& given, const double* at) {
       const double g = group.damped ? values[lane_at(i, count, 1)] : 0.0;
       own.take(group.kind, run, values, group.damped, i, at);
       own.evaluate(group.kind, own.p);
-      double stiffest = 0.0;  // J W J^T
+      double stiffest = 0.0;  // J W J^T of what has inertia: frames that settle are as light as one likes
       for (int j = 0; j < group.rows; ++j) {
         double sum = 0.0;
-        for (int d = 0; d < dofs; ++d) sum += own.w[d / 3] * own.J[j * dofs + d] * own.J[j * dofs + d];
+        for (int d = 0; d < dofs; ++d)
+          if (scene.inertial[given.block.particles[run.nodes[lane_at(i, group.arity, d / 3)] / at_row]])
+            sum += own.w[d / 3] * own.J[j * dofs + d] * own.J[j * dofs + d];
         stiffest = std::max(stiffest, sum);
       }
       if (a != 0.0 && !(a <= gives_way * (1.0 + g) * stiffest)) continue;

@@ -52,15 +52,19 @@ class RigidRows {
   // C, J and c there.
   void evaluate(const Given& given, const double* at);
   double residual(int j) const { return c_[j]; }
+  const std::vector<double>& residuals() const { return c_; }
   double weight(int j) const { return weight_[j]; }      // 1/(J W J^T + D) of where leave_out() was
   double steepest(int j) const { return steepest_[j]; }  // the largest number of its gradient, per length
   // Adds J^T lambda and the magnitudes of its terms, (particles, 4).
   void push(const DirectBlock& block, double* force, double* magnitude) const;
-  // The multipliers that leave the least of R, three numbers per movable particle, sum w |R - J^T lambda|^2, once J W J^T is factored where J is.
+  // What to add to the multipliers so that the least is left of R, three numbers per movable particle, sum w |R - J^T lambda|^2, and of the residuals c of
+  // the rows that give way, once J W J^T + D is factored where J is. The coordinates alone tell the multipliers -c/D of stiff rows with few digits.
   void factorize(const DirectBlock& block, const double* at);
   template <class U>
-  std::vector<U> balance(const DirectBlock& block, const double* at, const U* R) const {
+  std::vector<U> balance(const DirectBlock& block, const double* at, const U* R, const U* c) const {
     std::vector<U> b(Factor<double>::right_side(structure_), U(0.0));
+    for (int j = 0; j < size(); ++j)
+      if (D_[j] > 0.0 && !left_out_[j]) b[j] = U(0.0) - c[j];
     for_each_number(block, [&](int j, int dof, double J) {
       b[j] = b[j] + (J * at[sheetbend_blocks::row * (dof / 3) + 3]) * R[dof];
     });

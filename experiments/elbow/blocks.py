@@ -146,9 +146,11 @@ def scene_of(flight: Flight, gravity: float = 9.81) -> tuple[sb.Scene, sb.Body, 
     return scene, first, second
 
 
-def experiment(flight: Flight, frames: int | None = None, hinge: np.ndarray = HINGE) -> sb.Experiment:
+def experiment(
+    flight: Flight, frames: int | None = None, hinge: np.ndarray = HINGE, gravity: float = 9.81
+) -> sb.Experiment:
     """The flight's first frames as data, all by default; those after them are held out."""
-    scene, first, second = scene_of(flight)
+    scene, first, second = scene_of(flight, gravity)
     centers, turned = flight.second(hinge)
     one = sb.Recording.from_poses(flight.times, flight.positions, flight.quaternions, CORNERS)
     two = sb.Recording.from_poses(flight.times, centers, quaternions_of(turned), CORNERS)

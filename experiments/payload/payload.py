@@ -55,7 +55,7 @@ def fitted(tool: sb.Tool, wrist: sb.ForceRecording, seen: np.ndarray) -> sb.FitR
     guess = axes @ np.diag(moments * [1.05, 0.97, 1.03]) @ axes.T
     held = scene.add_body("load", mass=1.1 * MASS, inertia=guess, center=0.8 * CENTER, at=origin, rotation=frame)
     sb.fixed(gripper, held, name="grasp")
-    sensor = sb.ForceSensor(recording=wrist, at=gripper.particles.tolist(), sigma=FORCE, torque_sigma=TORQUE)
+    sensor = sb.ForceSensor(recording=wrist, at=gripper, sigma=FORCE, torque_sigma=TORQUE)
     return sb.fit(
         scene,
         sb.Recording(seen, tool.times[:-1:10]),

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import sheetbend as sb
+from random_mechanisms import gaps as exact
 
 INERTIA = sb.Inertia.box(0.3, (0.1, 0.06, 0.04))
 AT, AXIS = np.array([0.1, 0.02, 0.01]), np.array([0.2, 1.0, 0.3])
@@ -198,6 +199,28 @@ def test_an_axis_that_gives_way_has_exact_gradients(method: str) -> None:
     report = sb.check_gradients(scene, [0.01, 0.02], samples=1, solver=sb.Solver(h=1e-3, method=method))
     assert report.passed, str(report)
     assert {"hinge_tilt_stiffness", "hinge_tilt_damping"} <= set(scene.quantities)
+
+
+@pytest.mark.parametrize("compliance", [1e-6, 1e-8, 1e-10, 1e-12, 1e-14])  # m/N
+def test_stiff_mounts_balance_in_implicit_and_give_way_by_their_force(compliance: float) -> None:
+    """From 1e-12 m/N down the forces did not balance: the coordinates tell a force by too few digits."""
+
+    def swung(give: float | None) -> np.ndarray:
+        scene = sb.Scene("bars")
+        of = sb.Inertia.box(0.2, (0.1, 0.03, 0.02))
+        upper = scene.add_body("upper", of=of, at=(0.05, 0.0, 0.0))
+        lower = scene.add_body("lower", of=of, at=(0.15, 0.0, 0.0))
+        sb.hinge(None, upper, at=(0, 0, 0), axis=(0, 1, 0), rate=3.0)
+        sb.ball(upper, lower, at=(0.1, 0, 0), name="mount", compliance=give)
+        solver = sb.Solver(h=2e-3, method="implicit")
+        motion = sb.simulate(scene, np.arange(101) * 2e-3, solver)
+        assert max(exact(scene, solver).values()) < 1e-8
+        at = [o + R @ [end, 0.0, 0.0] for body, end in ((upper, 0.05), (lower, -0.05)) for o, R in [body.pose(motion)]]
+        if give is not None:
+            assert np.abs(at[0] - at[1] + give * motion.forces["mount_place"][:, 0])[1:].max() < 1e-15
+        return lower.pose(motion)[0]
+
+    assert np.abs(swung(compliance) - swung(None)).max() < 20.0 * compliance + 1e-11  # m, with forces of up to 9 N
 
 
 def arms(angles: list[float], solver: sb.Solver, until: float) -> np.ndarray:

@@ -318,3 +318,74 @@ def test_a_cloth_and_particles_with_drag_are_attached_to_a_body(tmp_path: Path) 
         (tmp_path / "wrong.toml").write_text(ON_A_BODY.replace(old, new))
         with pytest.raises(sb.ConfigError, match=words):
             scene_alone(parse(tmp_path / "wrong.toml"))
+
+
+def test_a_wrist_that_holds_a_body_weighs_its_load(tmp_path: Path) -> None:
+    times = np.arange(41) * 0.01
+    places = np.stack([0.05 * np.sin(8 * times), 0 * times, 0.03 * np.sin(11 * times)], axis=1)
+    quaternions = np.tile([0.0, 0.0, 0.0, 1.0], (41, 1))
+    np.savez(tmp_path / "robot.npz", times=times, positions=places, quaternions=quaternions)
+    scene, solver = sb.Scene("held"), sb.Solver(h=1e-3)
+    hand = scene.add_body("hand", of=sb.Inertia.box(1e-3, (0.02,) * 3), poses=sb.Tool(times, places, quaternions))
+    load = scene.add_body("load", of=sb.Inertia.box(0.3, (0.05, 0.05, 0.08)), at=(0.0, 0.0, -0.05))
+    sb.fixed(hand, load, at=(0.0, 0.0, -0.01), name="grasp")
+    wrist = sb.simulate_forces(scene, times[1:], hand, solver)
+    same = sb.simulate_forces(scene, times[1:], hand.particles.tolist(), solver)
+    assert (wrist.forces == same.forces).all()
+    np.savez(tmp_path / "wrist.npz", times=wrist.times, forces=wrist.forces)
+    sb.Recording(load.pose(sb.simulate(scene, times, solver))[0][:, None], times).save(tmp_path / "seen.npz")
+    (tmp_path / "held.toml").write_text(HELD, encoding="utf-8")
+    study = config.load(tmp_path / "held.toml")
+    found = sb.fit(study.experiments, parameters=study.parameters, refine=False)
+    assert found.values["load_mass"] == pytest.approx(0.3, rel=1e-6)
+    (tmp_path / "held.toml").write_text(HELD.replace('at = ["hand"]', 'at = ["load"]'), encoding="utf-8")
+    with pytest.raises(sb.SheetbendError, match="nothing holds"):
+        config.load(tmp_path / "held.toml")
+
+
+HELD = """
+[experiment]
+name = "held"
+
+[solver]
+h = 1e-3
+
+[[recording]]
+file = "seen.npz"
+sigma = 1e-4
+
+[[recording.force]]
+file = "wrist.npz"
+at = ["hand"]
+sigma = 0.05
+
+[[scene.tool]]
+name = "robot"
+file = "robot.npz"
+
+[[scene.body]]
+name = "hand"
+mass = 1e-3
+box = [0.02, 0.02, 0.02]
+tool = "robot"
+
+[[scene.body]]
+name = "load"
+mass = 0.2
+box = [0.05, 0.05, 0.08]
+at = [0.0, 0.0, -0.05]
+
+[[scene.joint]]
+kind = "fixed"
+name = "grasp"
+upper = "hand"
+lower = "load"
+at = [0.0, 0.0, -0.01]
+
+[[marker]]
+marker = 0
+body = "load"
+point = [0.0, 0.0, 0.0]
+
+[parameters.load_mass]
+"""

@@ -100,7 +100,9 @@ class Strand(Section):
     EA: Finite | None = key(None, "axial stiffness; inextensible when left out", "N", gt=0)
     start: Vector = key([0.0, 0.0, 0.0], "where a straight one starts; at the marker of a grip there", "m")
     direction: Vector | None = key(
-        None, "where a straight one points; as clamp_start, or else clamp_end, or along x, when left out"
+        None,
+        "where a straight one points; left out: as clamp_start, or else clamp_end, or else the grip of a rope that has "
+        "one, or along x",
     )
     points: list[Vector] | Literal["recording"] | None = key(
         None,

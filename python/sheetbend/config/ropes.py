@@ -100,10 +100,10 @@ def _start(
     if exact:
         assert length is not None
         points, speeds = curve(f"{path}.points", section, moment, seats, length, places)
-    elif points is None and set(places) == {"start"}:
-        points = line + (places["start"] - line[0])
     elif points is None and len(places) == 1:
-        points = line + (places["end"] - line[-1])
+        ((end, place),) = places.items()
+        line = _straight(section, _way(ends[end]))
+        points = line + (place - line[0 if end == "start" else -1])
     elif points is None and places:
         points = np.stack([places["start"], places["end"]])
     if ends:
@@ -121,14 +121,24 @@ def _pose(
 ) -> tuple[Array, Array] | None:
     if held is None or place is None:
         return None
-    if isinstance(held, BodyPoint) and held.along is not None:
-        return place, held.body.turned(held.along)
+    own = _way(held)
+    if own is not None:
+        return place, own
     way = np.diff(points[:2] if k == 0 else points[-2:], axis=0)[0]
-    return place, (held.direction[0] if isinstance(held, Grip) else way / max(float(np.linalg.norm(way)), 1e-12))
+    return place, way / max(float(np.linalg.norm(way)), 1e-12)
 
 
-def _straight(section: schema.Rope | schema.Rod) -> Array:
-    along = np.array(straight_way(section.direction, section.clamp_start, section.clamp_end)[1])
+def _way(held: Grip | Led | BodyPoint) -> Array | None:
+    """(3,) the direction in which a rope passes what holds its end at the start; None where that is free."""
+    if isinstance(held, BodyPoint):
+        return None if held.along is None else held.body.turned(held.along)
+    return held.direction[0] if isinstance(held, Grip) else None
+
+
+def _straight(section: schema.Rope | schema.Rod, held: Array | None = None) -> Array:
+    """Both ends of a straight rope, in the direction that is given, or else in that of what holds it."""
+    given = section.direction, section.clamp_start, section.clamp_end
+    along = held if held is not None and given == (None, None, None) else np.array(straight_way(*given)[1])
     size = float(np.linalg.norm(along)) or 1.0
     return np.array(section.start) + np.outer([0.0, 1.0], along) * ((section.length or 1.0) / size)
 

@@ -69,7 +69,8 @@ class ForceSection(Section):
     at: list[str] = key(
         ...,
         'the support: ["ROPE:start"] or ["ROPE:end"] for the end of a rope with its grip, ["CLOTH:SET"] for a set of '
-        "vertices, or particles; all of them held; torques are taken at the first",
+        'vertices, ["BODY"] for a [[scene.body]], or particles; all of them held; torques are taken at the first, the '
+        "center of mass of a body",
         min_length=1,
     )
     name: Name | None = key(None, "its quantities begin with it; the file's when left out")

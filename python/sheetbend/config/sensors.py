@@ -61,6 +61,8 @@ def _support(path: str, references: list[str], scene: Scene, particles: Particle
         elif name in scene.cloths and label in scene.cloths[name].mesh.sets:
             cloth = scene.cloths[name]
             found += [int(cloth.particles[v]) for v in cloth.mesh.sets[label]]
+        elif reference in scene.bodies:
+            found += scene.bodies[reference].particles.tolist()
         else:
             found.append(particles.find(f"{path}.at", reference))
     return list(dict.fromkeys(found))

@@ -17,6 +17,7 @@ from ..motion.solver import Solver
 from ..objects.markers import on_particle
 from ..recording.force_recording import ForceRecording
 from ..recording.recording import Recording
+from ..scene.body import Body
 from ..scene.given import check_scene
 from ..scene.scene import Scene
 from .experiment import Experiment
@@ -26,7 +27,7 @@ from .force_sensor import ForceSensor
 def simulate_forces(
     scene: Scene,
     times: ArrayLike,
-    at: tuple[str, str] | Sequence[int],
+    at: tuple[str, str] | Sequence[int] | Body,
     solver: Solver | None = None,
     values: Mapping[str, float] | None = None,
     *,

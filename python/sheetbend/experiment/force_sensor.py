@@ -15,7 +15,7 @@ from ..arrays.types import Array
 from ..errors import InputError
 from ..quantities.quantities import Term, product
 from ..recording.force_recording import ForceRecording
-from ..scene.body import GROUND
+from ..scene.body import GROUND, Body
 from ..scene.scene import Scene
 
 INPUTS = 11
@@ -43,8 +43,8 @@ class ForceSensor:
 
     Attributes:
         recording: what was measured, in the sensor's own axes.
-        at: the support: (rope, "start") or (rope, "end") for an end of a rope, or its particles, all of them held
-            (pinned or driven). Torques are taken at the first of them.
+        at: the support: (rope, "start") or (rope, "end") for an end of a rope, a body, or particles, all of them held
+            (pinned or driven). Torques are taken at the first of them, the center of mass of a body.
         name: of the sensor; the recording's by default. Its quantities begin with it.
         sigma: expected error of a force, N.
         torque_sigma: expected error of a torque, N m; None leaves torques out.
@@ -68,7 +68,7 @@ class ForceSensor:
     """
 
     recording: ForceRecording
-    at: tuple[str, str] | Sequence[int]
+    at: tuple[str, str] | Sequence[int] | Body
     sigma: float
     name: str = ""
     torque_sigma: float | None = None
@@ -172,6 +172,8 @@ class ForceSensor:
         """What the support holds, directors included; the place of the first one is where torques are taken."""
         if isinstance(self.at, Sequence) and len(self.at) == 2 and isinstance(self.at[0], str):
             return end_of_rope(scene, str(self.at[0]), str(self.at[1]), path)
+        if isinstance(self.at, Body):
+            return [int(p) for p in self.at.particles]
         found: list[int] = scene.node_array(f"{path}.at", self.at).tolist()
         return list(dict.fromkeys(found))
 
