@@ -104,7 +104,7 @@ class TestFit:
         for words in (
             "start at a bending length",
             "prediction: a recording that was not fitted is missed by",
-            "What trades against what",
+            "What the motion does not determine by itself",
             "EA: not fitted",
             "the fit that counts",
             "would move EI by",

@@ -187,6 +187,8 @@ def test_one_command_fits_all_and_does_nothing_twice(ropes: Path) -> None:
     broken.write_text(good)
     done = run("fit", ropes / "*.toml", "--output", out)
     assert "4 configurations, 3 of them done" in done.stdout
+    listed = run("fit", *(ropes / f"{name}.toml" for name in "abcd"), "--output", out)  # as the shell expands *.toml
+    assert "4 configurations, 4 of them done" in listed.stdout and listed.exit_code == done.exit_code
     assert {name: (out / name / "fit.json").stat().st_mtime_ns for name in "abd"} == before
     assert (out / "c" / "fit.json").is_file()
     again = last_line(run("fit", ropes / "*.toml", "--output", out, "--json"))["fits"]
@@ -245,7 +247,7 @@ class Interrupted(Executor):
 def test_ctrl_c_while_workers_fit_keeps_what_is_done(ropes: Path, tmp_path: Path) -> None:
     console = Screen()
     with console.capture() as told:
-        found = fit_all(console, str(ropes / "[ab].toml"), tmp_path, False, _single, Interrupted())
+        found = fit_all(console, [str(ropes / "[ab].toml")], tmp_path, False, _single, Interrupted())
     assert found.code is Code.INTERRUPTED and found.data["fits"]["b"] == 130
     assert "interrupted: the same command goes on from here" in told.get()
     assert (tmp_path / "a" / "fit.json").is_file() and not (tmp_path / "b").exists()
@@ -263,6 +265,7 @@ def test_an_unfinished_run_of_another_configuration_begins_anew(ropes: Path, tmp
 def test_several_fits_refuse_what_is_for_one(ropes: Path) -> None:
     assert last_line(run("fit", ropes / "*.toml", "--movie", "x.gif", "--json"))["error"]["field"] == "--movie"
     assert last_line(run("fit", ropes / "none*.toml", "--json"))["error"]["field"] == "config"
+    assert last_line(run("fit", ropes / "a.toml", ropes / "e.toml", "--json"))["error"]["got"].endswith("e.toml'")
     (ropes / "sub").mkdir()
     for name in ("one", "two"):
         (ropes / "sub" / f"{name}.toml").write_text((ropes / "a.toml").read_text(), encoding="utf-8")

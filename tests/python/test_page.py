@@ -269,6 +269,17 @@ class TestCommands:
         (motion,) = data_of((tmp_path / "a.html").read_text())["motions"]
         assert motion["frames"] == 5 and len(motion["markers"]) == 2
 
+    def test_views_of_a_recording_and_of_its_configuration_are_two_files(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.chdir(tmp_path)
+        sb.Recording(np.random.default_rng(1).standard_normal((5, 2, 3)), np.arange(5) / 10).save("a.csv")
+        Path("a.toml").write_text(
+            '[experiment]\nname = "a"\n[[scene.rope]]\nlength = 1.0\nsegments = 4\ndensity = 1.0\n'
+        )
+        assert [CliRunner().invoke(app, ["view", file]).exit_code for file in ("a.csv", "a.toml")] == [0, 0]
+        assert {path.name for path in Path("out").iterdir()} == {"a.html", "a_simulated.html"}
+
     @pytest.mark.parametrize(
         ("arguments", "words"),
         [

@@ -1,4 +1,4 @@
-"""sheetbend fit 'ropes/*.toml': a fit for each configuration, in its own folder; what is done is not done again."""
+"""sheetbend fit ropes/*.toml: a fit for each configuration, in its own folder; what is done is not done again."""
 
 from __future__ import annotations
 
@@ -29,19 +29,19 @@ Single = Callable[[Console, Path, Path, bool], Outcome]
 
 
 def fit_all(
-    console: Console, pattern: str, output: Path, strict: bool, single: Single, executor: Executor | None
+    console: Console, patterns: list[str], output: Path, strict: bool, single: Single, executor: Executor | None
 ) -> Outcome:
-    """Fit every configuration of a pattern, each into OUTPUT/NAME. The error of one that fails is printed and written
-    to OUTPUT/NAME/error.txt, and the others go on.
+    """Fit every configuration of some patterns, each into OUTPUT/NAME. The error of one that fails is printed and
+    written to OUTPUT/NAME/error.txt, and the others go on.
 
     Args:
         single: fits one of them: (console, configuration, folder, strict) -> outcome.
         executor: does several at the same time; None for one after the other.
 
     Raises:
-        ConfigError: the pattern names no configuration, or two have the same name.
+        ConfigError: a pattern names no configuration, or two have the same name.
     """
-    tasks, unread = _tasks(pattern, output)
+    tasks, unread = _tasks(patterns, output)
     made = {folder: _made(path, folder) for path, folder in tasks}
     left = [(path, folder) for path, folder in tasks if made[folder] is None]
     console.print(f"{len(tasks)} configurations, {len(tasks) - len(left)} of them done", soft_wrap=True)
@@ -80,16 +80,18 @@ def fit_all(
     return Outcome(data, worst)
 
 
-def _tasks(pattern: str, output: Path) -> tuple[list[tuple[Path, Path]], dict[Path, ConfigError]]:
+def _tasks(patterns: list[str], output: Path) -> tuple[list[tuple[Path, Path]], dict[Path, ConfigError]]:
     """Configurations in the order of their names, with their folders, and what is wrong with files that are none."""
-    paths = [Path(name) for name in sorted(glob.glob(pattern, recursive=True)) if Path(name).is_file()]
-    if not paths:
-        raise ConfigError(
-            "config", "names no file", pattern, "give a pattern of configurations, such as 'ropes/*.toml'"
-        )
+    paths: set[Path] = set()
+    for pattern in patterns:
+        found = {Path(name) for name in glob.glob(pattern, recursive=True)} | {Path(pattern)}
+        if not (files := {path for path in found if path.is_file()}):
+            fix = "give configurations, or a pattern of them such as 'ropes/*.toml'"
+            raise ConfigError("config", "names no file", pattern, fix)
+        paths |= files
     taken: dict[str, Path] = {}
     unread: dict[Path, ConfigError] = {}
-    for path in paths:
+    for path in sorted(paths):
         try:
             with reading(path, ConfigError):
                 name = parse_any(path).experiment.name

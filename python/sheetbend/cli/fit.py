@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -48,20 +49,21 @@ STAYS = "the journal stays: the same command with --resume goes on from here"
 
 
 def fit(
-    config: Annotated[
-        Path,
+    configs: Annotated[
+        list[Path],
         typer.Argument(
-            help="A TOML configuration (docs/configuration.md), or a pattern for several, such as 'ropes/*.toml'.",
+            help="A TOML configuration (docs/configuration.md). Several, or a pattern such as 'ropes/*.toml', are "
+            "fitted one after the other.",
             show_default=False,
         ),
     ],
-    more: Annotated[list[str] | None, typer.Argument(hidden=True)] = None,
     output: Annotated[
         Path | None,
         typer.Option(
             "--output",
             "-o",
-            help="Folder for fit.json, report.html, report.txt, figures and fitted.toml. Default: out/NAME.",
+            help="Folder for fit.json, report.html, report.txt, figures and fitted.toml. Default: out/NAME. Of several "
+            "fits, the folder that holds the folder NAME of each.",
             show_default=False,
         ),
     ] = None,
@@ -100,17 +102,19 @@ def fit(
     """
 
     def command(console: Console) -> Outcome:
-        if "*" in str(config) and not config.exists() and not more:
+        config, *others = configs
+        for other in others:
+            if other.suffix.lower() != ".toml":
+                fix = "give TOML files; values of an earlier fit are started from with --from fit.json"
+                raise ConfigError("--resume" if resume else "configs", "is no configuration", str(other), fix)
+        if others or (re.search(r"[*?[]", str(config)) and not config.exists()):
             if start is not None or movie is not None:
                 option = "--from" if start is not None else OPTION
                 raise ConfigError(option, "is not for several fits", str(start or movie), "leave it out")
             with workers_of(workers, dask) as executor:
                 where = Path.cwd() if dask else Path()  # workers elsewhere know no relative paths
                 place = where / (output or "out")
-                return fit_all(console, str(where / config), place, strict, _single, executor)
-        if more:
-            fix = "give one configuration; values of an earlier fit are started from with --from fit.json"
-            raise ConfigError("--resume" if resume else "arguments", "are too many", [str(config), *more], fix)
+                return fit_all(console, [str(where / c) for c in configs], place, strict, _single, executor)
         with workers_of(workers, dask) as executor, working_on(executor) as traffic:
             outcome = _fit(console, config, output, start, resume, movie, strict)
             if executor is not None:

@@ -34,7 +34,12 @@ def view(
     ],
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="The HTML file to write. Default: out/NAME.html.", show_default=False),
+        typer.Option(
+            "--output",
+            "-o",
+            help="The HTML file to write. Default: out/NAME.html; for a configuration out/NAME_simulated.html.",
+            show_default=False,
+        ),
     ] = None,
     units: Annotated[
         str | None, typer.Option(help="Length unit of the recording: m, cm, mm, in or ft.", show_default=False)
@@ -61,7 +66,7 @@ def _view(console: Console, file: Path, output: Path | None, units: str | None) 
         name, about = recording.name, recording.summary()
     else:
         name, about = study.config.experiment.name, study.config.experiment.about
-    page = output if output is not None else Path("out") / f"{name}.html"
+    page = output if output is not None else Path("out") / f"{name}{'_simulated' if simulated else ''}.html"
     if page.suffix.lower() not in (".html", ".htm"):
         raise ConfigError("--output", "is no HTML file", str(page), "give a file that ends in .html")
     check_targets("--output", page.parent, [page])

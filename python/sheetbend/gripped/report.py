@@ -1,4 +1,5 @@
-"""The report of a rope's fit: estimates, the steps of the recipe, what trades against what, and unseen recordings."""
+"""The report of a rope's fit: estimates, the steps of the recipe, what the motion does not determine by itself, and
+unseen recordings."""
 
 from __future__ import annotations
 
@@ -133,9 +134,9 @@ class RopeReport:
             *([] if stiffness is None else [stiffness]),
             *self._beside(),
             Section("Steps", headers, tuple(rows), notes),
-            Section("What trades against what", notes=trades(self.result)),
+            Section("What the motion does not determine by itself", notes=trades(self.result)),
             Section(
-                "What the intervals count",
+                "Errors that the intervals contain",
                 notes=counted(self.result, spread_words(as_quantities(self.found.spread), self.found.values)),
             ),
         ]
