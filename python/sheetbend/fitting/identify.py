@@ -266,7 +266,7 @@ def _explained(problem: FitProblem) -> FitProblem:
         replace(r, positions=np.where(r.mask[..., None], x, np.nan))
         for r, x in zip(problem.recordings, problem.simulate(u), strict=True)
     ]
-    return FitProblem(problem.experiments, problem.given, recordings, problem.threads, problem.parameters)
+    return problem.on(recordings)
 
 
 def _median(estimates: Sequence[Estimate]) -> Estimate:

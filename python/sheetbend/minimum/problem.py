@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from ..statistics.layout import Layout
 from . import content
 from .coordinates import Coordinates, sums_of
 from .counts import count
+from .data_rows import layout_of, times_of
 from .evaluator import Evaluator
 from .journal import Timed
 from .lifted import Known, Lifted, WithStates, lifted
@@ -56,12 +57,19 @@ class FitProblem(OnTheWay):
         self.given, self.threads, self._corrected = parameters, threads, corrected
         self._last: tuple[np.ndarray, tuple[bool, np.ndarray, np.ndarray]] | None = None
         self.seconds: dict[bool, float] = {}
-        self._layout: Layout | None = None
         self.recordings = tuple(recordings if recordings is not None else (e.fitted() for e in experiments))
         names = [e.name for e in experiments]
         if len(set(names)) != len(names):
             raise InputError("experiments", "share a name", names, "give each a name of its own")
         self.parameters = expanded_to(parameters, self.experiments) if expanded is None else expanded
+        self._made_from: dict[str, Any] = {
+            "experiments": self.experiments,
+            "parameters": parameters,
+            "recordings": self.recordings,
+            "threads": threads,
+            "expanded": self.parameters,
+            "corrected": corrected,
+        }
         theta, slots, slot_of = self._slots()
         held = [None if corrected is None else corrected.get(e.name, NOTHING) for e in self.experiments]
         cores = [e.core(r, b) for e, r, b in zip(self.experiments, self.recordings, held, strict=True)]
@@ -81,9 +89,11 @@ class FitProblem(OnTheWay):
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Made again from what it was made from."""
-        made_from = (self.experiments, self.given, self.recordings, self.threads, self.parameters, self._corrected)
-        return FitProblem, made_from
+        return partial(FitProblem, **self._made_from), ()
+
+    def replaced(self, **changes: Any) -> FitProblem:
+        """The same problem with some of the arguments that it was made with changed."""
+        return FitProblem(**{**self._made_from, **changes})
 
     @cached_property
     def coordinates(self) -> Coordinates:
@@ -111,11 +121,11 @@ class FitProblem(OnTheWay):
     def holding(self, name: str, value: float) -> FitProblem:
         """The same problem with one (expanded) parameter held at a value."""
         held = self.parameters.replace(name, fixed=True, initial=value, prior=None, lower=-np.inf, upper=np.inf)
-        return FitProblem(self.experiments, self.given, self.recordings, self.threads, held)
+        return self.replaced(expanded=held)
 
     def of(self, experiments: Sequence[Experiment]) -> FitProblem:
         """The same problem of other experiments with the same recordings, such as these with another solver."""
-        return FitProblem(experiments, self.given, self.recordings, self.threads, self.parameters)
+        return self.replaced(experiments=experiments)
 
     def follow(self, other: FitProblem) -> FitProblem:
         """This problem, with corrections that begin where those of another one ended, of the same recordings or of
@@ -126,19 +136,17 @@ class FitProblem(OnTheWay):
 
     def on(self, recordings: Sequence[Recording]) -> FitProblem:
         """The same problem on parts of the recordings."""
-        return FitProblem(
-            self.experiments, self.given, recordings, self.threads, self.parameters, corrected=self._corrected
-        )
+        return self.replaced(recordings=recordings)
 
     def uncorrected(self, recordings: Sequence[Recording]) -> FitProblem:
         """The same problem on (parts of) the recordings, with the markers that scenes follow taken for the truth."""
-        return FitProblem(self.experiments, self.given, recordings, self.threads, self.parameters, corrected={})
+        return self.replaced(recordings=recordings, corrected={})
 
     def moved(self, by: Mapping[str, np.ndarray]) -> FitProblem:
         """The same problem with the markers that scenes follow moved, by experiment (knots * markers * 3,) m."""
         shapes = {e.name: e.correction(r) for e, r in zip(self.experiments, self.recordings, strict=True)}
         given = {name: np.reshape(x, shape.shape) for name, x in by.items() if (shape := shapes[name]) is not None}
-        return FitProblem(self.experiments, self.given, self.recordings, self.threads, self.parameters, given)
+        return self.replaced(corrected=given)
 
     def around(self, name: str) -> FitProblem:
         """The part that one free (expanded) parameter is tied to, through shared parameters; the rest of the minimum
@@ -156,7 +164,7 @@ class FitProblem(OnTheWay):
         experiments, recordings = [self.experiments[i] for i in chosen], [self.recordings[i] for i in chosen]
         names = set().union(*map(self.acting_on, experiments))
         part = reaching(self.parameters, names)
-        return FitProblem(experiments, self.given, recordings, self.threads, part, self._corrected)
+        return self.replaced(experiments=experiments, recordings=recordings, expanded=part)
 
     def acting_on(self, e: Experiment) -> tuple[str, ...]:
         """The free (expanded) parameters that an experiment's motion depends on, in their order."""
@@ -304,42 +312,14 @@ class FitProblem(OnTheWay):
         ends = np.cumsum([len(sensor["measured"]) for sensor in self.sensed[experiment]])
         return np.split(every, ends[:-1]) if len(ends) else []
 
+    @cached_property
+    def _layout(self) -> Layout:
+        return layout_of(self.experiments, self.recordings, self.sensed)
+
     def rows_layout(self) -> Layout:
-        """Where each data row comes from, for the covariance. Markers are on clock 0, force sensors on clocks of their
-        own; each axis of either is a kind of its own, but along a static shape all are one. Of a cloud, points in the
-        same row count as one channel, which is as good as any: they are others in every frame."""
-        if self._layout is not None:
-            return self._layout
-        recording, channel, frame, kind, clock = [], [], [], [], []
-        for i, (e, r) in enumerate(zip(self.experiments, self.recordings, strict=True)):
-            seen_frame, seen_marker = np.nonzero(r.mask)
-            axes = np.tile(np.arange(e.rows_each), len(seen_frame))
-            frames, markers = np.repeat(seen_frame, e.rows_each), np.repeat(seen_marker, e.rows_each)
-            recording.append(np.full(len(axes), i))
-            # Along a static shape the points are the series.
-            channel.append(axes if e.static else markers * len(e.axes) + axes)
-            frame.append(markers if e.static else frames)
-            kind.append(0 * axes if e.static else axes)
-            clock.append(np.zeros(len(axes), dtype=int))
-            for k, sensor in enumerate(self.sensed[i], start=1):
-                sample, reads = np.nonzero(~np.isnan(sensor["measured"]))
-                recording.append(np.full(len(sample), i))
-                channel.append(reads)
-                frame.append(sample)
-                kind.append(3 + reads)
-                clock.append(np.full(len(sample), k))
-        self._layout = Layout(*(np.concatenate(part) for part in (recording, channel, frame, kind, clock)))
+        """Where each data row comes from, see `data_rows`."""
         return self._layout
 
     def row_times(self) -> np.ndarray:
         """(rows,) s, when each data row was recorded; of an equilibrium NaN."""
-        times = []
-        for e, r, sensed in zip(self.experiments, self.recordings, self.sensed, strict=True):
-            seen_frame, _ = np.nonzero(r.mask)
-            when = np.full(len(seen_frame), np.nan) if e.static else r.times[seen_frame]
-            times.append(np.repeat(when, e.rows_each))
-            for force, sensor in zip(e.forces, sensed, strict=True):
-                span = (float(r.times[0]), float(r.times[-1]))
-                at = force.recording.times[force.kept(e.t0, span)]
-                times.append(at[np.nonzero(~np.isnan(sensor["measured"]))[0]])
-        return np.concatenate(times)
+        return times_of(self.experiments, self.recordings, self.sensed)
