@@ -100,13 +100,13 @@ def test_ceres_leaves_a_limit_that_nothing_presses_on(monkeypatch):
     problem = limited(initial=0.06, lower=0.025)
     resting = [frozenset(), frozenset(), frozenset({1}), frozenset()]
     runs = []
-    run = by_ceres.holding
+    run = by_ceres.run
 
-    def counted(problem, w, held, most, tolerance, best, watch, *more):
-        runs.append((held, watch))
-        return run(problem, w, held, most, tolerance, best, watch, *more)
+    def counted(problem, w, most, tolerance, watch):
+        runs.append((watch.held, watch.limits))
+        return run(problem, w, most, tolerance, watch)
 
-    monkeypatch.setattr(by_ceres, "holding", counted)
+    monkeypatch.setattr(by_ceres, "run", counted)
     monkeypatch.setattr(by_ceres, "_resting", lambda problem, w: resting.pop(0))
     minimize(problem, problem.parameters.initial(), "ceres")
     assert runs == [(frozenset(), True), (frozenset(), False)]

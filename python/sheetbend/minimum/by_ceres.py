@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -44,9 +44,9 @@ def search(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: f
     spent = [0, 0, 0]
     watch = sums = True
     while True:
-        left = max_iterations - spent[0]
         steps = GeometricSteps(wanted=sums and not problem.estimates_corrections)
-        end, stopped = holding(problem, w, held, left, tolerance, best, watch, steps, spent[0])
+        watched = Watch(problem.coordinates, best, held, watch, steps, spent[0])
+        end, stopped = run(problem, w, max_iterations - spent[0], tolerance, watched)
         spent = [a + b for a, b in zip(spent, (end.iterations, end.evaluations, end.jacobians), strict=True)]
         end = replace(end, iterations=spent[0], evaluations=spent[1], jacobians=spent[2])
         if end.interrupted or (stopped is None and not held):
@@ -81,55 +81,53 @@ def _resting(problem: FitProblem, w: np.ndarray) -> frozenset[int]:
     return frozenset(resting.tolist()) if len(resting) < len(w) else frozenset()
 
 
-class _Watch:
-    """What Ceres calls after every iteration. It ends the run where the steps have a sum, and if it is to watch, where
-    coordinates that are not held have been at a limit for two iterations; `stopped` is that point."""
+@dataclass
+class Watch:
+    """What Ceres calls after every iteration.
 
-    def __init__(
-        self,
-        coordinates: Coordinates,
-        held: frozenset[int],
-        best: Best,
-        watch: bool,
-        steps: GeometricSteps,
-        first: int,
-    ) -> None:
-        self._coordinates, self._held, self._best = coordinates, sorted(held), best
-        self._watch, self._steps, self._first = watch, steps, first
-        self._before = np.zeros(len(coordinates.longest), dtype=bool)
-        self.stopped: np.ndarray | None = None
+    Attributes:
+        coordinates: in which it searches.
+        best: is told of every point.
+        held: coordinates that rest at a limit.
+        limits: whether to end the run where others have been at a limit for two iterations.
+        steps: of this run; where they have a sum, it ends.
+        before: iterations of earlier runs.
+        stopped: the point where it ended the run.
+    """
+
+    coordinates: Coordinates
+    best: Best
+    held: frozenset[int]
+    limits: bool
+    steps: GeometricSteps
+    before: int = 0
+    stopped: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        self._limited = np.zeros(len(self.coordinates.longest), dtype=bool)
 
     def __call__(self, iteration: int, cost: float, step: float, gradient: float, at: list[float]) -> bool:
-        lower, upper = self._coordinates.limits()
+        lower, upper = self.coordinates.limits()
         here = np.array(at)
-        self._best(self._first + iteration, cost, self._coordinates.out(here))
+        self.best(self.before + iteration, cost, self.coordinates.out(here))
         limited = (here <= lower) | (here >= upper)
-        limited[self._held] = False
-        if self._steps.add(here) and not limited.any():
+        limited[sorted(self.held)] = False
+        if self.steps.add(here) and not limited.any():
             self.stopped = here
-        elif self._watch and iteration > 1 and (limited & self._before).any():
-            self.stopped, self._steps.sum = here, None
-        self._before = limited
+        elif self.limits and iteration > 1 and (limited & self._limited).any():
+            self.stopped, self.steps.sum = here, None
+        self._limited = limited
         return self.stopped is None
 
 
-def holding(
-    problem: FitProblem,
-    w: np.ndarray,
-    held: frozenset[int],
-    max_iterations: int,
-    tolerance: float,
-    best: Best,
-    watch: bool,
-    steps: GeometricSteps,
-    first: int = 0,
+def run(
+    problem: FitProblem, w: np.ndarray, max_iterations: int, tolerance: float, watch: Watch
 ) -> tuple[Minimum, np.ndarray | None]:
-    """One run, whose iterations count on from `first`, and where `_Watch` ended it, if it did."""
+    """One run of Ceres, and where it was ended by what watches it, if it was."""
     from .. import _ceres as ceres
 
     coordinates = problem.coordinates
     lower, upper = coordinates.limits()
-    watched = _Watch(coordinates, held, best, watch, steps, first)
     out: dict[str, Any] = {}
     with suppress(KeyboardInterrupt):
         out = ceres.minimize(
@@ -138,11 +136,11 @@ def holding(
             lower=lower,
             upper=upper,
             longest_step=coordinates.longest,
-            held=sorted(held),
+            held=sorted(watch.held),
             residual_seconds=problem.seconds.get(False, 0.0),
             max_iterations=max_iterations,
             tolerance=tolerance,
-            observe=watched,
+            observe=watch,
         )
     iterations, evaluations, jacobians = (out.get(name, 0) for name in ("iterations", "evaluations", "jacobians"))
     count(evaluations, jacobians)  # which do not come through the problem
@@ -150,11 +148,11 @@ def holding(
     def ended(u: np.ndarray, cost: float, converged: bool, interrupted: bool, message: str) -> Minimum:
         return Minimum(u, cost, iterations, evaluations, converged, interrupted, message, jacobians=jacobians)
 
-    if not out or (out["stopped"] and watched.stopped is None):
-        return ended(best.u, best.cost, False, True, "interrupted: the best point so far"), None
+    if not out or (out["stopped"] and watch.stopped is None):
+        return ended(watch.best.u, watch.best.cost, False, True, "interrupted: the best point so far"), None
     if not 0.0 <= out["cost"] < np.inf:  # Ceres tells a cost of -1 where its first point has no derivatives
-        return ended(best.u, best.cost, False, False, out["message"]), None
+        return ended(watch.best.u, watch.best.cost, False, False, out["message"]), None
     end = coordinates.out(np.array(out["u"]))
     if "jacobian" in out and not coordinates.charts:
         problem.keep(end, out["residual"], out["jacobian"])
-    return ended(end, out["cost"], out["converged"], False, out["message"]), watched.stopped
+    return ended(end, out["cost"], out["converged"], False, out["message"]), watch.stopped
