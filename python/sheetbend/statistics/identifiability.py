@@ -18,7 +18,7 @@ from ..errors import InputError
 from ..quantities.parameters import Parameters
 from ..result.estimate import Correlation, Estimate
 from .body_numbers import BodyNumbers
-from .gauge import RANK_TOLERANCE, Gauge
+from .gauge import Gauge
 from .judge import Floor, Judge, Linear, Nuisance
 from .layout import Layout
 from .profile import Profile, Profiler
@@ -64,7 +64,6 @@ def identify(
     fixes: Mapping[tuple[str, str], str] | None = None,
     bodies: Sequence[BodyNumbers] = (),
     linear_ones: Container[str] = (),
-    rank_tolerance: float = RANK_TOLERANCE,
 ) -> Identifiability:
     """Judge every free parameter of a finished fit.
 
@@ -87,7 +86,6 @@ def identify(
             "upper").
         bodies: rigid bodies of which numbers are fitted.
         linear_ones: parameters whose profiles are not asked for.
-        rank_tolerance: see `gauge.RANK_TOLERANCE`.
 
     Raises:
         InputError: shapes disagree, numbers are not finite, or a name is unknown.
@@ -98,9 +96,7 @@ def identify(
     nuisance = nuisance or Nuisance(np.zeros((0, len(parameters.free))), 0.0)
     errors = np.zeros((len(residuals), 0)) if errors is None else errors
     limits, fixes = limits or {}, fixes or {}
-    judge = Judge(
-        parameters, internal, residuals, jacobian, layout, rank_tolerance, nuisance, errors, limits, fixes, bodies
-    )
+    judge = Judge(parameters, internal, residuals, jacobian, layout, nuisance, errors, limits, fixes, bodies)
     linear = [
         judge.linear(column, (discretization.get(name, 0.0), systematic.get(name, 0.0)))
         for column, name in enumerate(parameters.free)

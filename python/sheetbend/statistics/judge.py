@@ -14,7 +14,7 @@ from ..quantities.wording import figures, floor_words, quantity, ran_off_words, 
 from ..result.estimate import Correlation, Estimate
 from .body_numbers import BodyNumbers, in_ten_numbers
 from .covariance import Covariance, covariance
-from .gauge import Gauge, null_space
+from .gauge import RANK_TOLERANCE, Gauge, null_space
 from .intervals import (
     at_far_limit,
     clipped,
@@ -101,19 +101,18 @@ class Judge:
         residuals: Array,
         jacobian: Array,
         layout: Layout | None,
-        tolerance: float,
         nuisance: Nuisance,
         errors: Array,
         limits: Mapping[str, str],
         fixes: Mapping[tuple[str, str], str],
-        bodies: Sequence[BodyNumbers] = (),
+        bodies: Sequence[BodyNumbers],
     ) -> None:
         self.parameters, self.internal, self.limits, self.fixes = parameters, internal, limits, fixes
         names, log = parameters.free, [parameters[name].log for name in parameters.free]
         data = np.vstack([jacobian, nuisance.jacobian])
         self.rows = np.vstack([data, parameters.prior_jacobian()])
-        self.space = null_space(self.rows, names, log, tolerance)
-        seen_by_data = null_space(data, names, log, tolerance).determined
+        self.space = null_space(self.rows, names, log, RANK_TOLERANCE)
+        seen_by_data = null_space(data, names, log, RANK_TOLERANCE).determined
         prior = self.rows[len(jacobian) :]
         self.by_prior = set(self.space.determined) - set(seen_by_data)
         lower, upper = parameters.bounds()
