@@ -19,8 +19,8 @@ from sheetbend.errors import InputError
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum import recordings
 from sheetbend.minimum.approach import inside
-from sheetbend.minimum.blocks import ManyProblem
 from sheetbend.minimum.journal import Journal
+from sheetbend.minimum.many import ManyProblem
 from sheetbend.minimum.problem import FitProblem
 from test_workers import Backwards
 

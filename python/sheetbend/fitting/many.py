@@ -15,10 +15,11 @@ from ..arrays.types import Array
 from ..errors import InputError, SheetbendError
 from ..experiment.experiment import Experiment
 from ..experiment.wanted import ParameterLike, as_parameters
-from ..minimum.blocks import Arrow, ManyApproach, ManyProblem, reduced
+from ..minimum.arrow import Arrow, reduced
 from ..minimum.counts import counted
 from ..minimum.journal import journaled
 from ..minimum.linear_algebra import one_blas_thread
+from ..minimum.many import ManyApproach, ManyProblem
 from ..minimum.progress import Progress
 from ..minimum.workers import shared_out
 from ..optional import require

@@ -42,7 +42,7 @@ class Tally:
 
 
 class Walked(Protocol):
-    """What a walk asks of a problem: `problem.FitProblem`, or many recordings (`blocks.ManyProblem`)."""
+    """What a walk asks of a problem: `problem.FitProblem`, or many recordings (`many.ManyProblem`)."""
 
     @property
     def parameters(self) -> Parameters: ...
