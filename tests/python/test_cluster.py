@@ -16,7 +16,7 @@ import pytest
 import sheetbend as sb
 from commands import run
 from sheetbend.errors import ConfigError, InputError
-from sheetbend.minimum import content, workers
+from sheetbend.minimum import digests, workers
 from sheetbend.minimum.cluster import dask
 from sheetbend.minimum.cluster import workers as workers_of
 from sheetbend.minimum.traffic import Traffic
@@ -116,16 +116,16 @@ def test_a_fit_goes_on_where_workers_are_killed(client: Any, alone: str) -> None
 
 
 def test_workers_of_another_version_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    here = content.of_software()
+    here = digests.of_software()
 
     def map_(**changed: str) -> list[int]:
         workers._kept.values.clear()
         common = Common(2)
         common.packed()
-        monkeypatch.setattr(content, "of_software", lambda: here | changed)
+        monkeypatch.setattr(digests, "of_software", lambda: here | changed)
         with working_on(Backwards()):
             found = common.map(_product, [1, 2])
-        monkeypatch.setattr(content, "of_software", lambda: here)
+        monkeypatch.setattr(digests, "of_software", lambda: here)
         return found
 
     with pytest.warns(RuntimeWarning, match=r"last digits.*processor") as told:

@@ -19,7 +19,7 @@ import pytest
 import sheetbend as sb
 from sheetbend import _core
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum import content, journal, journal_values
+from sheetbend.minimum import digests, journal, journal_values
 from sheetbend.minimum.by_ceres import has_ceres
 from sheetbend.minimum.journal import Journal
 from sheetbend.minimum.optimizers import minimize
@@ -362,8 +362,8 @@ class TestRefusals:
     @pytest.mark.parametrize("label", ["sheetbend", "compiled _core", "processor", "C library", "NumPy"])
     def test_another_version_or_machine(self, label: str, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         self.begun(path)
-        software = content.of_software()
-        monkeypatch.setattr(content, "of_software", lambda: software | {label: "other"})
+        software = digests.of_software()
+        monkeypatch.setattr(digests, "of_software", lambda: software | {label: "other"})
         with pytest.raises(sb.InputError, match=f"{label} .* then, other now"):
             Journal(path, {"[fit]": "abc"})
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..config import Config, GrippedConfig
 from ..errors import ConfigError, InputError
-from ..minimum.content import digest
+from ..minimum.digests import digest
 from ..minimum.journal import Journal, remove
 from ..recording.recording import Recording
 

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from .. import _core
-from . import content
+from . import digests
 from .coordinates import Coordinates
 from .journal import Evaluation, Timed, current
 
@@ -53,7 +53,7 @@ class Evaluator:
             self._key, self._made_from = self._journal.problem(self._made_from()), None
         key, state = self._key, self._state()
         if state:
-            key += content.digest([state, jacobian]).encode()  # a Jacobian too changes the state
+            key += digests.digest([state, jacobian]).encode()  # a Jacobian too changes the state
         found, seconds, behind = self._journal.evaluate(
             key, u, jacobian, lambda: self._core.evaluate(u, jacobian), self._state
         )

@@ -28,7 +28,7 @@ from typing import ParamSpec, Protocol, Self, TypeVar
 import numpy as np
 
 from ..errors import InputError
-from . import content
+from . import digests
 from .journal_values import pack, seal, unpack, unseal
 
 COMMIT_SECONDS = 0.1  # at least, between commits: what a kill may cost besides the evaluation under way
@@ -106,7 +106,7 @@ class Journal(AbstractContextManager["Journal"]):
                 made = self._db.execute("SELECT sql FROM sqlite_master WHERE sql IS NOT NULL ORDER BY sql").fetchall()
                 if made != [(f"CREATE TABLE {t}",) for t in TABLES]:
                     raise sqlite3.DatabaseError("it has other tables than a journal")
-                self._expect("fit", {**content.of_software(), **(about or {})})
+                self._expect("fit", {**digests.of_software(), **(about or {})})
                 kept = self._db.execute("SELECT key, jacobian IS NOT NULL FROM evaluation").fetchall()
                 sizes = "coalesce(sum(length(residuals) + length(state) + coalesce(length(jacobian), 0)), 0)"
                 self._size: int = self._db.execute(f"SELECT {sizes} FROM evaluation").fetchone()[0]
@@ -165,7 +165,7 @@ class Journal(AbstractContextManager["Journal"]):
                 except FAULTS as error:
                     self._stop(error)
                 self._problem_known = True
-        return content.digest(made_from).encode()
+        return digests.digest(made_from).encode()
 
     def evaluate(
         self,

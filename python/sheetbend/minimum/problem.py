@@ -16,7 +16,7 @@ from ..motion.equilibrium import no_rest
 from ..quantities.parameters import Parameters
 from ..recording.recording import Recording
 from ..statistics.layout import Layout
-from . import content
+from . import digests
 from .coordinates import Coordinates, sums_of
 from .counts import count
 from .data_rows import layout_of, times_of
@@ -85,7 +85,7 @@ class FitProblem(OnTheWay):
         cores = [{**c, "shooting": repr(e.shooting)} for c, e in zip(cores, self.experiments, strict=True)]
         self._spread = Spread.of(self)
         self.evaluator = Evaluator(
-            self._spread or self.core, lambda: content.of_problem(scenes, cores, theta, slots, free)
+            self._spread or self.core, lambda: digests.of_problem(scenes, cores, theta, slots, free)
         )
 
     def __reduce__(self) -> tuple[Any, ...]:

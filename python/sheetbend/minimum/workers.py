@@ -22,7 +22,7 @@ from functools import wraps
 from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
 
 from ..errors import InputError, SheetbendError
-from . import content
+from . import digests
 from .linear_algebra import one_blas_thread
 from .traffic import Traffic
 
@@ -99,7 +99,7 @@ class Common(Generic[S]):
     def packed(self) -> tuple[bytes, bytes]:
         """Key and content of the common part, with what the bits of results depend on besides."""
         if self._packed is None:
-            packed = pickle.dumps((content.of_software(), self.value), pickle.HIGHEST_PROTOCOL)
+            packed = pickle.dumps((digests.of_software(), self.value), pickle.HIGHEST_PROTOCOL)
             self._packed = hashlib.blake2b(packed, digest_size=16).digest(), packed
         return self._packed
 
@@ -187,7 +187,7 @@ def _answer(work: Callable[[Any, Any], T], key: bytes, common: bytes | None, ite
         if common is None:
             return None
         software, value = pickle.loads(common)  # which this worker's own client packed
-        here = content.of_software()
+        here = digests.of_software()
         values[key] = value, {name: (text, here[name]) for name, text in software.items() if here[name] != text}
         while len(values) > KEPT:
             values.popitem(last=False)
