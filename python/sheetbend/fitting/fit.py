@@ -202,7 +202,7 @@ def fit(
     check_count("threads", threads, 1, MOST_WHOLE, InputError)
     require("scipy.special", "fit")  # of intervals, behind all the work
     asked = Asked(wanted_refinement(refine), systematic, {} if given is None else given, profiles, bootstrap, threads)
-    search = Search(optimizer, starts, windows, max_iterations, tolerance, progress)
+    search = Search(optimizer, windows, max_iterations, tolerance, progress, starts)
     clock = Clock.started()
     fitted = _fitted(experiments)
     if leave_one_out:

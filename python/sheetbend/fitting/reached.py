@@ -17,7 +17,8 @@ from ..doubts.stationary import from_start
 from ..minimum.growth import Growth, growths
 from ..minimum.problem import FitProblem
 from ..minimum.progress import Minimum
-from ..minimum.search import NEAR_TOLERANCE, Found, Search
+from ..minimum.search import Found, Search
+from ..minimum.way import NEAR_TOLERANCE
 from ..result.estimate import Estimate
 
 
