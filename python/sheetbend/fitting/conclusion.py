@@ -14,6 +14,7 @@ from ..doubts.beyond_bounds import beyond_bounds
 from ..doubts.bootstrap import bootstrap, wider
 from ..doubts.conclude import judged_parameters, of_inputs
 from ..doubts.contradictions import between_parts, together
+from ..doubts.driven_noise import driven_doubts
 from ..doubts.floors import at_floor_of_sweeps
 from ..doubts.given import half_widths, premises
 from ..doubts.losses import loss_doubts
@@ -35,7 +36,6 @@ from ..quantities.parameters import Parameters
 from ..result.bootstrap import Bootstrap
 from ..result.estimate import Given, Premise
 from ..statistics.identifiability import Identifiability
-from .clouds import driven_beside_clouds
 from .reached import Reached
 
 IGNORED = ", and their standard deviations do not count"
@@ -138,7 +138,10 @@ def _doubts(
     contradicted |= between_parts(at.problem, at.u, judged, refinement)
     if reached.lost:
         return (), contradicted
-    warnings, drawn_off = driven_beside_clouds(at.problem, at.u, judged)
+    warnings: tuple[str, ...] = ()
+    drawn_off: dict[str, str] = {}
+    if not any(e.is_cloud for e in at.problem.experiments):  # whose points nobody follows over time
+        warnings, drawn_off = driven_doubts(at.problem, at.u, judged)
     warnings += loss_doubts(at.problem, at.u, judged)
     wrong = wrong_in_either((at.problem, at.u), fitted, told, refinement)
     warnings += wrong_given_warnings(at.problem, wrong)
