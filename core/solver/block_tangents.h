@@ -1,28 +1,28 @@
-// The directions of a direct block's numbers, handed to the kernels of core/blocks/block_tangents.h. State is a BlockState of duals.
+// The directions of a direct block's numbers, which are duals, handed to the kernels of core/blocks/block_tangents.h.
 #pragma once
 
 #include "core/blocks/kernels.h"
-#include "core/scalar/numbers.h"
-#include "core/solver/block_volume.h"
+#include "core/solver/block_state.h"
 
 namespace sheetbend {
 
-template <class State, class At>
+template <class T>
 void values_tangents(const sheetbend_blocks::Values& values, const sheetbend_blocks::TangentKernels& kernels,
-                     State& state, At& at) {
+                     BlockState<T>& state, typename BlockState<T>::Values& at) {
   kernels.values(values, {state.value_directions.data(), at.x.directions(), at.C.directions()});
 }
 
-template <class State>
+template <class T>
 void refer_tangents(const sheetbend_blocks::References& references, int size,
-                    const sheetbend_blocks::TangentKernels& kernels, State& state) {
+                    const sheetbend_blocks::TangentKernels& kernels, BlockState<T>& state) {
   kernels.refer(references, size, {state.now.C.directions(), state.before.C.directions(), state.C_r.directions()});
 }
 
 // The directions' share of one iteration: after the values are solved for, before they are pushed. solve_sparse(b) is for blocks that are no band.
-template <class T, class State, class Solve>
+template <class T, class Solve>
 void project_tangents(const DirectBlock& block, const sheetbend_blocks::TangentKernels& kernels,
-                      const sheetbend_blocks::Block& arrays, State& state, int iteration, Solve&& solve_sparse) {
+                      const sheetbend_blocks::Block& arrays, BlockState<T>& state, int iteration,
+                      Solve&& solve_sparse) {
   auto& own = state.at(iteration);
   sheetbend_blocks::Tangents t{};
   t.values = state.value_directions.data();

@@ -1,7 +1,7 @@
 """The size and the length of the prior of a smooth field, found from the recordings before a fit searches.
 
 They follow from the marginal likelihood: all parameters integrated out of the linear picture at the minimum that
-belongs to the last ones, as the gaps of windows are found (`continuity`). Data count with the variance and the
+belongs to the last ones, as the gaps of windows are found (`window_loss`). Data count with the variance and the
 autocorrelation that their residuals show (empirical Bayes; MacKay 1992, Neural Computation 4).
 """
 

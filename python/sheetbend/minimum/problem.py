@@ -62,7 +62,7 @@ class FitProblem(OnTheWay):
         if len(set(names)) != len(names):
             raise InputError("experiments", "share a name", names, "give each a name of its own")
         self.parameters = expanded_to(parameters, self.experiments) if expanded is None else expanded
-        self._made_from = {
+        self._made_from: dict[str, Any] = {
             "experiments": self.experiments,
             "parameters": parameters,
             "recordings": self.recordings,
