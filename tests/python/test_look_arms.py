@@ -10,6 +10,7 @@ import pytest
 import sheetbend as sb
 import takes
 from commands import run
+from scipy.integrate import solve_ivp
 from sheetbend.look import Take, draft, seen
 from test_look_strangers import bars, drafted
 
@@ -97,3 +98,30 @@ def test_a_tool_at_the_place_of_a_marker(tmp_path: Path) -> None:
     found, content = drafted(tmp_path, r.positions[:, [0, *range(9)]], 100, 0.0)
     assert "m1 is at the place of another marker in every frame, and left out" in found.seen
     assert content["scene"]["rod"][0]["hold_roll"] == ["start"]
+
+
+def test_arms_whose_mass_is_at_their_ends(tmp_path: Path) -> None:
+    """The first arm was no body, by noise, and both began as uniform rods: the fit ended without a minimum."""
+    length, mass, viscosity = np.array([0.3, 0.25]), np.array([1.0, 0.6]), 0.002
+    hung = mass[::-1].cumsum()[::-1] * length
+
+    def slope(_: float, y: Array) -> Array:
+        turn, w = y[0] - y[1], y[2:]
+        inertia = np.array([[hung[0] * length[0], hung[1] * length[0] * np.cos(turn)]] * 2)
+        inertia[1] = hung[1] * length[0] * np.cos(turn), hung[1] * length[1]
+        pull = hung[1] * length[0] * np.sin(turn) * np.array([-(w[1] ** 2), w[0] ** 2])
+        hinge = viscosity * np.array([w[0] + w[0] - w[1], w[1] - w[0]])
+        return np.concatenate([w, np.linalg.solve(inertia, pull - 9.81 * hung * np.sin(y[:2]) - hinge)])
+
+    t = np.arange(601) / 100
+    q = solve_ivp(slope, (0.0, 6.0), [0.7, 0.5, 0.0, 0.0], t_eval=t, rtol=1e-9, atol=1e-10).y[:2].T
+    ends = np.cumsum(length[:, None] * np.stack([np.sin(q), 0.0 * q, -np.cos(q)], axis=2), axis=1)
+    _, content = drafted(tmp_path, np.concatenate([np.zeros((len(t), 1, 3)), ends], axis=1), 100, 2e-4)
+    upper, lower = content["scene"]["arm"]
+    whole = upper["inertia"] + length[0] ** 2 * lower["mass"]  # of the first arm with what hangs on it
+    first = upper["first_moment"] + length[0] * lower["mass"]
+    assert first / whole == pytest.approx(hung[0] / (hung[0] * length[0]), rel=0.03)
+    assert lower["first_moment"] / whole == pytest.approx(hung[1] / (hung[0] * length[0]), rel=0.03)
+    assert lower["inertia"] / whole == pytest.approx(hung[1] * length[1] / (hung[0] * length[0]), rel=0.03)
+    least = content["parameters"]["upper_first_moment"]["lower"]
+    assert upper["inertia"] / length[0] < least < upper["first_moment"]  # elsewhere a particle's mass is negative

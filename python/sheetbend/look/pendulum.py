@@ -85,19 +85,19 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
             f"by {1.0 + stretch:.4f}"
         )
     pieces, swing = _pieces(s, takes[0], len(arms)), _swing(x, r.times, joints)
-    lost = decay(swing, SMOOTH) if len(arms) == 1 else None
-    unknown += [lost.words()] if lost is not None else []
+    known = decay(swing, SMOOTH) if len(arms) == 1 else _moments(s, swing, pieces, radii)
+    unknown += [known.words()] if isinstance(known, Decay) else []
     # The plane is y = 0: elsewhere rounding moves the arms out of it, and the fold of their triangles grows.
     pivot = (np.nanmean(x[:, joints[0]], axis=0) * (1.0, 0.0, 1.0)).tolist()
     step = float(np.median(np.diff(r.times)))
     lines = takes[0].scene_lines + table("[solver]", {"substeps": max(1, int(np.ceil(step / SUBSTEP - 1e-9)))})
-    if lost is not None:
-        lines += _point_mass(pivot, radii[0], lost)
+    if isinstance(known, Decay):
+        lines += _point_mass(pivot, radii[0], known)
     else:
-        lines += _arms(arms, pivot, radii, _moments(s, swing, pieces, radii))
+        lines += _arms(arms, pivot, radii, known)
     lines += _markers(arms, names[1:], radii)
     lines += _recordings(s, swing, pieces, arms, names[1:], radii)
-    for name, entries in _parameters(arms, radii, lost).items():
+    for name, entries in _parameters(arms, radii, known).items():
         lines += table(f"[parameters.{name}]", entries)
     if len(arms) > 2:
         lines += table("[fit]", {"profiles": False}, {"profiles": "true follows each number, which takes long"})
@@ -142,15 +142,16 @@ def _recordings(
     return lines
 
 
-def _parameters(arms: Sequence[str], radii: Sequence[float], lost: Decay | None) -> dict[str, dict[str, Any]]:
+def _parameters(arms: Sequence[str], radii: Sequence[float], known: Decay | Moments) -> dict[str, dict[str, Any]]:
     """What is fitted."""
     found: dict[str, dict[str, Any]]
-    if lost is not None:
+    if isinstance(known, Decay):
         found = {"arm_length": {"lower": 0.2 * radii[0], "upper": 5.0 * radii[0]}}
-        found |= {f"arm_{'hinge_' * (key == 'viscosity')}{key}": {} for key in lost.torques}
+        found |= {f"arm_{'hinge_' * (key == 'viscosity')}{key}": {} for key in known.torques}
     else:
         found = {f"{arm}_{key}": {} for arm in arms for key in ("first_moment", "inertia")}
         del found["upper_inertia"]  # the scale of all masses
+        found["upper_first_moment"]["lower"] = 1.0001 * known.inertia[0] / radii[0]  # see `add_arm`
         found |= {f"{arm}_{loss}": {} for loss in ("friction", "hinge_viscosity") for arm in arms}
         found["lower_drag"] = {}
     found |= {f"{arm}_zero": {} for arm in arms}

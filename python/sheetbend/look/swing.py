@@ -21,6 +21,7 @@ from ..arrays.types import Array
 INTERVAL = 0.2  # s, of one momentum balance
 UNIFORM = 4.0 / 3.0  # mass over first_moment^2/inertia of a uniform rod
 LEAST, MOST = 1.1, 0.8  # of first_moment^2/inertia, an arm's mass at least; of what its carrier has room for, at most
+PERCUSSION = 0.97  # of first_moment times length, the inertia of an arm that carries another at most (see `add_arm`)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,13 +103,15 @@ def _shared(inertia: Array, first: Array, viscosity: Array, lengths: Array) -> M
         own[k], about[k] = first[k] - lengths[k] * carried, inertia[k] - lengths[k] ** 2 * carried
         if not (own[k] > 0.0 and about[k] > 0.0):
             return None
+        if k < arms - 1:
+            about[k] = min(about[k], PERCUSSION * own[k] * lengths[k])
         least = own[k] ** 2 / about[k]
         mass[k] = UNIFORM * least
         if k:
             above = lengths[k - 1]
             room = MOST * min(first[k - 1] / above, inertia[k - 1] / above**2) - carried
             mass[k] = min(mass[k], room)
-        if mass[k] < LEAST * least or (k < arms - 1 and about[k] >= own[k] * lengths[k]):
+        if mass[k] < LEAST * least:
             return None
         carried += mass[k]
     return Moments(mass / mass[0], own / mass[0], about / mass[0], viscosity / mass[0])

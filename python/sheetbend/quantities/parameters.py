@@ -137,7 +137,10 @@ class Parameter:
 
     def to_physical(self, internal: float) -> float:
         """The physical value of an internal coordinate; infinite, or the least positive one, where an optimizer strays
-        too far."""
+        too far. That of a bound is the bound, without a rounding that would be outside."""
+        for bound in (self.lower, self.upper):
+            if internal == self.to_internal(bound):
+                return bound
         with np.errstate(over="ignore", under="ignore"):
             return max(float(np.exp(internal)), float(np.finfo(float).tiny)) if self.log else float(internal)
 
