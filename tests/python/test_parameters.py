@@ -174,6 +174,6 @@ def test_vectors_and_values_of_the_wrong_kind_are_refused() -> None:
 def test_a_bound_keeps_its_bits() -> None:
     """The next window of a fit refused a first moment that had ended on its bound: exp(log(x)) was less by rounding."""
     for lower in np.random.default_rng(0).uniform(0.1, 10.0, 100).tolist():
-        p = Parameter("a", log=True, initial=2.0 * lower, lower=lower, upper=3.0 * lower)
+        p = Parameter(name="a", log=True, initial=2.0 * lower, lower=lower, upper=3.0 * lower)
         assert p.to_physical(p.to_internal(lower)) == lower
         assert p.to_physical(p.to_internal(p.upper)) == p.upper

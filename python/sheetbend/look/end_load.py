@@ -13,10 +13,12 @@ from ..arrays.types import Array
 from .held import Held
 from .seen import REST, Seen, motion_of
 
-FEWEST, FRAMES = 5, 20  # markers on the rope, and frames in which all are seen, at least
+FEWEST, FRAMES = 4, 20  # markers on the rope, and frames in which all are seen, at least
 MOVES = 0.3  # m/s^2, root mean square across the rope, at least: less is hidden by noise
-COUNTS = 0.05  # of the mass of the rope: a smaller one cannot be told from markers and stiffness
+COUNTS, MOST = 0.05, 30.0  # masses of the rope: less cannot be told from markers and stiffness, nor more from it
 AGREE = 0.25  # of the median: how far apart the quartiles of what the markers tell may be
+HEAVY = 3.0  # masses of the rope: where all agree on more, it does not matter on how much
+ALONG = 0.15  # of the pull of a heavy load: so much of it is across the rope at most, unless it is stiff
 
 
 def free_end(found: Held) -> str | None:
@@ -53,11 +55,23 @@ def end_load(s: Seen, way: tuple[int, ...]) -> float | None:
     told = []
     for k in range(1, 1 + len(way) // 2):  # the bending stiffness counts more near the free end
         of_rope, of_mass = (across(x, k, v) for v in (beyond(pull, arc, k), pull[:, -1]))
-        if np.mean(np.sum(of_mass**2, axis=1)) < MOVES**2:
-            return None
-        told.append(-float(np.sum(of_rope * of_mass) / np.sum(of_mass**2)))
-    low, load, high = np.quantile(told, [0.25, 0.5, 0.75])
-    return float(load) if load > COUNTS * arc[-1] and high - low < AGREE * load else None
+        told.append(_balance(of_rope, of_mass, float(np.linalg.norm(_shares(arc, k)))))
+    low, load, high = np.quantile(np.minimum(told, MOST * arc[-1]), [0.25, 0.5, 0.75])
+    heavy = low > HEAVY * arc[-1] and np.mean(of_mass**2) < ALONG**2 * np.mean(pull[:, -1] ** 2)
+    agree = heavy or high - low < AGREE * load <= AGREE * HEAVY * arc[-1]
+    return float(load) if load > COUNTS * arc[-1] and agree else None  # not where one is not a number
+
+
+def _balance(of_rope: Array, of_mass: Array, noise: float) -> float:
+    """The factor of `of_mass` (frames, 3) that balances `of_rope`, whose noise is so many times as large (Deming):
+    below a heavy load a rope is straight, and nearly nothing of it is across. Not a number where both are small."""
+    both = np.stack([of_rope.ravel() / noise, of_mass.ravel()])
+    sizes, ways = np.linalg.eigh(both @ both.T / len(of_rope))
+    (rope, mass) = ways[:, 0]
+    if sizes[1] < MOVES**2:
+        return float("nan")
+    heavier = rope * mass <= 0.0 and abs(mass) > abs(rope)  # than any, by chance
+    return float("inf") if heavier else float(noise * mass / rope)
 
 
 def _moving(s: Seen, way: tuple[int, ...]) -> tuple[Array, Array] | None:
@@ -81,7 +95,13 @@ def beyond(pull: Array, arc: Array, k: int) -> Array:
         pull: (frames, markers, 3) m/s^2, of each marker.
         arc: (markers,) m, along the rope.
     """
-    return np.asarray(np.sum(0.5 * (pull[:, k:-1] + pull[:, k + 1 :]) * np.diff(arc[k:])[:, None], axis=1))
+    return np.asarray(np.einsum("k,fkx->fx", _shares(arc, k), pull[:, k:]))
+
+
+def _shares(arc: Array, k: int) -> Array:
+    """(markers - k,) m, the length of rope at each marker from the k-th on."""
+    half = 0.5 * np.diff(arc[k:])
+    return np.concatenate([half, [0.0]]) + np.concatenate([[0.0], half])
 
 
 def across(x: Array, k: int, v: Array) -> Array:

@@ -12,9 +12,10 @@ import numpy as np
 from ..arrays.smoothing import smoothed
 from ..arrays.timeseries import interpolate
 from ..arrays.types import Array
-from .end_load import FEWEST, FRAMES, across, beyond
+from .end_load import FRAMES, across, beyond
 from .seen import REST, Seen
 
+FEWEST = 5  # markers on the rope, at least
 CLEARLY = 0.5  # of what is left with the way that is taken for down: less is left with another one
 
 

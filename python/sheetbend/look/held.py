@@ -279,7 +279,8 @@ def _of_hand(s: Seen, hand: tuple[int, ...], found: Held, held_before: Sequence[
         found.unknown.append(
             f"where the rope leaves the hand, and in which direction: as the next markers swing, {where.lead:.2g} "
             f"m from {name}. Both are fitted: the whole rope is rope_length + rope_{at}_lead long. Measure the length "
-            "from the hand to that marker, and give it as `lead` with a narrower prior"
+            "from the hand to that marker, and give it as `lead` with a narrower prior. If the rope is tied there and "
+            "turns freely, rope_EI becomes as small as it can, and says nothing about the rope"
         )
         found.leads[at] = grip["lead"] = where.lead
         found.rope |= {"tilts": True, "shifts": True}
