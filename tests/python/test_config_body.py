@@ -329,6 +329,8 @@ def test_a_wrist_that_holds_a_body_weighs_its_load(tmp_path: Path) -> None:
     hand = scene.add_body("hand", of=sb.Inertia.box(1e-3, (0.02,) * 3), poses=sb.Tool(times, places, quaternions))
     load = scene.add_body("load", of=sb.Inertia.box(0.3, (0.05, 0.05, 0.08)), at=(0.0, 0.0, -0.05))
     sb.fixed(hand, load, at=(0.0, 0.0, -0.01), name="grasp")
+    size = {"length": 0.1, "segments": 2, "density": 1e-3, "EI": 1e-4, "GJ": 1e-4}
+    sb.add_rod(scene, "cable", **size, start=load.point((0.0, 0.0, -0.04), along=(0.0, 0.0, -1.0)))  # type: ignore[arg-type]
     wrist = sb.simulate_forces(scene, times[1:], hand, solver)
     same = sb.simulate_forces(scene, times[1:], hand.particles.tolist(), solver)
     assert (wrist.forces == same.forces).all()
@@ -336,6 +338,9 @@ def test_a_wrist_that_holds_a_body_weighs_its_load(tmp_path: Path) -> None:
     sb.Recording(load.pose(sb.simulate(scene, times, solver))[0][:, None], times).save(tmp_path / "seen.npz")
     (tmp_path / "held.toml").write_text(HELD, encoding="utf-8")
     study = config.load(tmp_path / "held.toml")
+    rod = study.experiments[0].scene.ropes["cable"]
+    along = sb.simulate(study.experiments[0].scene, [0.0], solver).positions[0, rod.particles]
+    assert along == pytest.approx(np.linspace([0.0, 0.0, -0.09], [0.0, 0.0, -0.19], 3), abs=1e-15)  # as its grip points
     found = sb.fit(study.experiments, parameters=study.parameters, refine=False)
     assert found.values["load_mass"] == pytest.approx(0.3, rel=1e-6)
     (tmp_path / "held.toml").write_text(HELD.replace('at = ["hand"]', 'at = ["load"]'), encoding="utf-8")
@@ -381,6 +386,20 @@ name = "grasp"
 upper = "hand"
 lower = "load"
 at = [0.0, 0.0, -0.01]
+
+[[scene.rod]]
+name = "cable"
+length = 0.1
+segments = 2
+density = 1e-3
+EI = 1e-4
+GJ = 1e-4
+
+[[scene.rod.grip]]
+at = "start"
+body = "load"
+position = [0.0, 0.0, -0.04]
+direction = [0.0, 0.0, -1.0]
 
 [[marker]]
 marker = 0

@@ -134,12 +134,12 @@ class Scene(BlownScene):
         Args:
             particles: (k,), or what `Body.point` returns.
             forces: (knots, k, 3) N in the world's axes; on a point (knots, 3).
-            times: (knots,) s.
+            times: (knots,) s; other forces may have others.
             name: of a force on a point, which makes it the quantities `<name>_x`, `_y`, `_z` N, and with several knots
                 (at most 50) `<name>_x_0`, `_y_0`, ...; without one its numbers are none.
 
         Raises:
-            SceneError: shapes, NaN, or other knots than an earlier call's.
+            SceneError: shapes, or NaN.
         """
         self._building()
         if isinstance(particles, BodyPoint):
