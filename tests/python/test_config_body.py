@@ -106,11 +106,11 @@ def test_configured_cable_with_plug_and_flap_is_fitted(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "match"),
     [
-        ('upper = "plug"', 'upper = "plgu"', "no body of the scene"),
-        ('body = "plug"\nposition', 'body = "plgu"\nposition', "no body of the scene"),
+        ('upper = "plug"', 'upper = "plgu"', "is not a body of the scene"),
+        ('body = "plug"\nposition', 'body = "plgu"\nposition', "is not a body of the scene"),
         ("axis = [0.0, 1.0, 0.0]\n", "", "without axis"),
         ("stiffness = 1e-3", "compliance = 1e-3", "hinge with compliance"),
-        ("stiffness = 1e-3", "limits = [0.5, -0.5]", r"scene.joint\[0\].*are no range"),
+        ("stiffness = 1e-3", "limits = [0.5, -0.5]", r"scene.joint\[0\].*are not a range"),
         ("stiffness = 1e-3", "limits = [0.1, 0.5]", "0.1 rad outside"),
         ("stiffness = 1e-3", "limits = [0.5]", "limits"),
         ("stiffness = 1e-3", "limit_damping = 0.1", "acts at limits, and there are none"),
@@ -233,12 +233,12 @@ def test_a_configured_slider_has_a_spring_and_a_damper(tmp_path: Path) -> None:
     [
         ("values = [0.1, -0.2]", "values = [0.1]", "different numbers"),
         ("rotor = 1e-5", "", "rotor"),
-        ('starts_on = "shown"', 'starts_on = "other"', "no tool of the scene"),
+        ('starts_on = "shown"', 'starts_on = "other"', "is not a tool of the scene"),
         ('starts_on = "shown"', 'starts_on = "shown"\nat = [0.0, 0.0, 0.0]', "has at"),
         ('starts_on = "shown"\n', "", "no tool for it"),
         ('body = "lower"\npoint', "point", "on nothing"),
         ('body = "lower"\npoint', 'body = "box"\nparticles = ["box"]\npoint', "particles and a body"),
-        ('body = "lower"\npoint', 'body = "other"\npoint', "no body of the scene"),
+        ('body = "lower"\npoint', 'body = "other"\npoint', "is not a body of the scene"),
     ],
 )
 def test_mistakes_in_servos_starts_and_forces_are_told(tmp_path: Path, old: str, new: str, match: str) -> None:
@@ -312,7 +312,7 @@ def test_a_cloth_and_particles_with_drag_are_attached_to_a_body(tmp_path: Path) 
     rate = scene.bodies["pole"].angular_velocity(motion)[1, 0]
     assert rate == pytest.approx(2.0 / (1.0 + 2.0 * 0.2 * 1e-3 / moment), rel=2e-3)
     for old, new, words in (
-        ('body = "pole"', 'body = "none"', "no body of the scene"),
+        ('body = "pole"', 'body = "none"', "is not a body of the scene"),
         ("drag = 1e-3", "pinned = true", r"^scene.particles\[0\].particles: cannot fix these"),
     ):
         (tmp_path / "wrong.toml").write_text(ON_A_BODY.replace(old, new))

@@ -44,7 +44,7 @@ from .progress import Iterations
 from .screen import heading, listing, show
 from .targets import check_targets
 
-STAYS = "the journal stays: the same command with --resume goes on from here"
+STAYS = "the journal stays: the same command with --resume continues from here"
 
 
 def fit(
@@ -109,7 +109,7 @@ def fit(
                 place = where / (output or "out")
                 return fit_all(console, str(where / config), place, strict, _single, executor)
         if more:
-            fix = "give one configuration; values of an earlier fit are started from with --from fit.json"
+            fix = "give one configuration; to start from the values of an earlier fit, give --from fit.json"
             raise ConfigError("--resume" if resume else "arguments", "are too many", [str(config), *more], fix)
         with workers_of(workers, dask) as executor, working_on(executor) as traffic:
             outcome = _fit(console, config, output, start, resume, movie, strict)
@@ -258,7 +258,7 @@ def _study(config: Config, source: Path, start: Path | None) -> Study:
         )
     if start is not None:
         if not start.is_file():
-            raise ConfigError("--from", "is no file", str(start), "give the fit.json of an earlier fit")
+            raise ConfigError("--from", "is not a file", str(start), "give the fit.json of an earlier fit")
         config = with_values(config, FitResult.load(start).values)
     return build(config, source)
 
@@ -269,7 +269,7 @@ def _check_starts(config: Config, problem: FitProblem) -> None:
             if name not in problem.parameters.free:
                 raise ConfigError(
                     f"fit.starts[{i}].{name}",
-                    "is no free parameter",
+                    "is not a free parameter",
                     name,
                     f"use some of: {', '.join(problem.parameters.free)}",
                 )

@@ -73,7 +73,7 @@ class Search:
         if not is_number(self.tolerance) or not 0 < self.tolerance < 1:
             raise InputError("tolerance", "must lie between 0 and 1", self.tolerance, "give a relative change of cost")
         if self.progress is not None and not callable(self.progress):
-            raise InputError("progress", "is no function", self.progress, "give one, or leave it out")
+            raise InputError("progress", "is not a function", self.progress, "give one, or leave it out")
         if isinstance(self.starts, int):
             check_count("starts", self.starts, 0, MOST_STARTS, InputError)
         elif not isinstance(self.starts, Sequence) or not all(isinstance(one, Mapping) for one in self.starts):

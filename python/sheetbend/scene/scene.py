@@ -187,7 +187,7 @@ class Scene(BlownScene):
         """
         self._building()
         if not isinstance(kind, str) or kind not in KINDS:
-            raise SceneError("kind", "is no known constraint", kind, f"use one of: {', '.join(KINDS)}")
+            raise SceneError("kind", "is not a known constraint", kind, f"use one of: {', '.join(KINDS)}")
         name = kind if name is None else name
         check_label("add_constraints.name", name)
         if any(g.name == name for g in self.groups):
