@@ -104,7 +104,7 @@ class TestFit:
         for words in (
             "start at a bending length",
             "prediction: a recording that was not fitted is missed by",
-            "Parameters that compensate for each other",
+            "What the motion does not determine by itself",
             "EA: not fitted",
             "the last fit, to",
             "would move EI by",

@@ -109,7 +109,7 @@ def fit(
                 place = where / (output or "out")
                 return fit_all(console, str(where / config), place, strict, _single, executor)
         if more:
-            fix = "give one configuration; to start from the values of an earlier fit, give --from fit.json"
+            fix = "give one configuration; values of an earlier fit are started from with --from fit.json"
             raise ConfigError("--resume" if resume else "arguments", "are too many", [str(config), *more], fix)
         with workers_of(workers, dask) as executor, working_on(executor) as traffic:
             outcome = _fit(console, config, output, start, resume, movie, strict)

@@ -133,9 +133,9 @@ class RopeReport:
             *([] if stiffness is None else [stiffness]),
             *self._beside(),
             Section("Steps", headers, tuple(rows), notes),
-            Section("Parameters that compensate for each other", notes=trades(self.result)),
+            Section("What the motion does not determine by itself", notes=trades(self.result)),
             Section(
-                "What the intervals include",
+                "Errors that the intervals contain",
                 notes=counted(self.result, spread_words(as_quantities(self.found.spread), self.found.values)),
             ),
         ]
