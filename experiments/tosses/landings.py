@@ -4,8 +4,8 @@
 
 The cube is a rigid body with rounded corners, which touch the table. A fit to the first frames after contact of every
 other toss finds friction, the dissipation of the contact, the rounding, the moments of inertia, the center of mass, the
-height of the table and the scale of lengths. Friction is found again from the whole paths. The other tosses are
-predicted from their frames before contact, beside the numbers that the authors of the data state, and beside
+height of the table and the scale of lengths. Friction and dissipation are found again from the whole paths. The other
+tosses are predicted from their frames before contact, beside the numbers that the authors of the data state, and beside
 predictions without physics. FOLDER holds more tosses of this cube in a cube_tosses.npz as the source's
 (`make_data.py`), which are predicted too.
 """
@@ -21,13 +21,14 @@ import numpy as np
 import sheetbend as sb
 from cube import MASS, SIDE
 from cutting import RATE, read_and_cut
-from scipy.optimize import minimize_scalar
+from scipy.optimize import minimize
 from sheetbend.arrays.rotations import matrices_of
 from sheetbend.quantities.quantities import Term
 from toss_files import again
 
 DATA = Path(__file__).parent / "data" / "tosses.npz"
 SCALE = 1.0176  # of the data's lengths, from free flight
+CENTER = np.array([3e-4, 5e-4, 5.2e-3])  # m, of mass, from free flight
 SEEN = 8  # frames that a prediction starts from
 FEWEST = 4  # frames before contact of a toss of another folder
 AFTER = (2, 4, 6)  # frames from the first contact on that the fits see, one after the other
@@ -37,7 +38,7 @@ COMPARED = CORNERS[[0, 3, 5, 6]]  # a tetrahedron
 INERTIA = MASS * (SIDE / SCALE) ** 2 / 6  # kg m^2, of a homogeneous cube
 STIFFNESS = 6e4  # N/m, of a corner
 SIGMA = 1e-3  # m, of a corner: what the model may be off by
-FRICTION = (0.15, 0.2)  # in which that of whole paths is looked for
+STEPS = {"table_friction": 0.01, "table_contact_dissipation": 1.0}  # with which those of whole paths are looked for
 FROM = {  # where the fit starts
     "table_friction": 0.2,
     "table_contact_dissipation": 2.0,
@@ -80,6 +81,15 @@ def tosses(folder: Path | None = None) -> list[Toss]:
     return [Toss(f"toss {toss}", x[a:b], q[a:b], int(free)) for a, b, toss, free in ends]
 
 
+def start_of(toss: Toss, seen: int, down: np.ndarray) -> dict[str, np.ndarray]:
+    """The state that the cube starts with. Its center of mass flies along a parabola, and not its middle."""
+    first = slice(0, min(seen, toss.free))
+    flown = toss.positions[first] + matrices_of(toss.quaternions[first]) @ CENTER
+    start = sb.start_of_poses(toss.times[first], flown, toss.quaternions[first], down)
+    arm = start["rotation"] @ CENTER
+    return {**start, "at": start["at"] - arm, "velocity": start["velocity"] - np.cross(start["spin"], arm)}
+
+
 def scene_of(toss: Toss, seen: int, restitution: float | None = None) -> sb.Scene:
     """The cube that flies from its first `seen` frames onto the table, which is soft, or rigid with a restitution.
 
@@ -87,8 +97,7 @@ def scene_of(toss: Toss, seen: int, restitution: float | None = None) -> sb.Scen
     gravity with them.
     """
     down = np.array([0.0, 0.0, -9.81 / SCALE])
-    first = slice(0, min(seen, toss.free))
-    start = sb.start_of_poses(toss.times[first], toss.positions[first], toss.quaternions[first], down)
+    start = start_of(toss, seen, down)
     scene = sb.Scene(toss.name, gravity=down)
     cube = scene.add_body("cube", of=sb.Inertia.box(MASS, np.full(3, SIDE / SCALE)), **start)
     soft = {"stiffness": STIFFNESS, "dissipation": FROM["table_contact_dissipation"]}
@@ -139,17 +148,21 @@ def fitted(group: list[Toss]) -> sb.Fit:
     return fit
 
 
-def friction_of_whole_paths(group: list[Toss], values: Mapping[str, float]) -> float:
-    """The friction with which the other values predict whole paths best: the score is the mean error of the center over
-    time plus a third of that at rest."""
+def of_whole_paths(group: list[Toss], values: Mapping[str, float]) -> dict[str, float]:
+    """The values with the friction and the dissipation that predict whole paths best: the score is the mean error of
+    the center over time plus a third of that at rest."""
     scenes = [scene_of(toss, toss.free) for toss in group]
 
-    def score(friction: float) -> float:
-        own = {**values, "table_friction": friction}
-        found = np.array([errors(toss, own, scene) for toss, scene in zip(group, scenes, strict=True)])
+    def with_them(steps: np.ndarray) -> dict[str, float]:
+        return {**values, **{name: values[name] + step * STEPS[name] for name, step in zip(STEPS, steps, strict=True)}}
+
+    def score(steps: np.ndarray) -> float:
+        found = np.array([errors(toss, with_them(steps), scene) for toss, scene in zip(group, scenes, strict=True)])
         return float(found[:, 0].mean() + found[:, 1].mean() / 3.0)
 
-    return float(minimize_scalar(score, bounds=FRICTION, method="bounded", options={"xatol": 5e-4}).x)
+    around = np.array([[0.0, 0.0], [2.0, 0.0], [1.0, 1.0]])
+    options = {"initial_simplex": around, "xatol": 0.05, "fatol": 0.02}
+    return with_them(minimize(score, around[0], method="Nelder-Mead", options=options).x)
 
 
 def errors(toss: Toss, values: Mapping[str, float], scene: sb.Scene) -> np.ndarray:
@@ -198,8 +211,8 @@ def main(count: int, folder: Path | None) -> None:
     impact = {name: fit.values[name] for name in FROM}
     ratios = ", ".join(f"{impact[f'cube_inertia_{axis}'] / INERTIA:.3f}" for axis in (1, 2, 3))
     print(f"moments of inertia over those of a homogeneous cube: {ratios} (of a thin shell 1.667)")
-    found = {**impact, "table_friction": friction_of_whole_paths(data, impact)}
-    print(f"friction of whole paths: {found['table_friction']:.4f}")
+    found = of_whole_paths(data, impact)
+    print("of whole paths: " + ", ".join(f"{name} {found[name]:.4g}" for name in STEPS))
     report(f"fitted, the {len(data)} tosses of the fit", data, found)
     for seen in (None, SEEN):
         report(f"fitted, {len(rest)} others", rest, found, seen)

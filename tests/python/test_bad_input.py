@@ -390,7 +390,7 @@ WRONG_TYPES = {
             ).places
         ),
     ),
-    "particle that is no number": ("second", lambda: sb.between(0, 1.5, 0.5)),
+    "particle that is not a number": ("second", lambda: sb.between(0, 1.5, 0.5)),
 }
 
 

@@ -173,7 +173,7 @@ def test_what_cannot_be_attached_is_refused() -> None:
     for hold in (lambda: scene.pin(top), lambda: scene.drive(top, [0.0, 1.0], np.zeros((2, len(top), 3)))):
         with pytest.raises(sb.SceneError, match="attached to the body 'pole'"):
             hold()
-    with pytest.raises(sb.SceneError, match="is no body"):
+    with pytest.raises(sb.SceneError, match="is not a body"):
         sb.attach(scene, [1])  # type: ignore[arg-type]
 
 

@@ -137,5 +137,5 @@ def test_settle_moves_no_body_that_something_holds():
 
 def test_particles_have_no_points():
     scene = sb.rope(0.2, 8, density=0.05, EA=200.0, EI=1e-4, start=(0, 0, 0.1))
-    with pytest.raises(sb.SceneError, match="no body"):
+    with pytest.raises(sb.SceneError, match="not a body"):
         scene.add_contact(scene.ropes["rope"], sb.Plane(name="table"), friction=0.1, points=[[0, 0, 0]])

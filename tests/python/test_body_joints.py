@@ -169,6 +169,26 @@ def test_servo_follows_and_a_torque_turns_body_and_rotor() -> None:
         wheel(torque=([0.0], [1.0]))
 
 
+def test_motors_and_forces_may_have_knots_of_their_own() -> None:
+    knots = np.array([0.0, 0.05, 0.1, 0.2, 0.3])
+
+    def moved(own: bool) -> np.ndarray:
+        scene = sb.Scene("arm")
+        torques = ([0.0, 0.1, 0.3], [0.0, 0.3, -0.2]), ([0.0, 0.05, 0.2], [0.1, -0.1, 0.2])
+        first, second = (torque if own else (knots, np.interp(knots, *torque)) for torque in torques)
+        of = sb.Inertia.box(0.2, (0.1, 0.02, 0.02))
+        upper, lower = (scene.add_body(name, of=of, at=(x, 0, 0)) for name, x in (("upper", 0.05), ("lower", 0.15)))
+        sb.hinge(None, upper, at=(0, 0, 0), axis=(0, 1, 0), name="shoulder", torque=first, rotor=1e-3)
+        sb.hinge(upper, lower, at=(0.1, 0, 0), axis=(0, 1, 0), name="elbow", torque=second, rotor=1e-3)
+        push, times = ([[0.0, 0.0, 0.5]], [0.0]) if own else (np.tile([0.0, 0.0, 0.5], (5, 1)), knots)
+        scene.add_force(lower.point((0.05, 0, 0)), push, times, name="push")
+        if own:
+            assert sb.check_gradients(scene, [0.0, 0.02], sb.Solver(h=1e-3)).passed
+        return sb.simulate(scene, np.arange(31) * 0.01, sb.Solver(h=1e-3)).positions
+
+    assert moved(own=True) == pytest.approx(moved(own=False), abs=1e-13)
+
+
 def gate(g: float, **options: object) -> tuple[sb.Scene, sb.Body]:
     """A bar that stands out from a hinge with an upright axis."""
     scene = sb.Scene("gate", gravity=(0.0, 0.0, -g))
@@ -288,7 +308,7 @@ def test_bad_joints_are_refused() -> None:
         sb.ball(body, body, at=(0.0, 0.0, 0.0))
     with pytest.raises(sb.SceneError, match="another scene"):
         sb.ball(other, body, at=(0.0, 0.0, 0.0))
-    with pytest.raises(sb.SceneError, match="is no body"):
+    with pytest.raises(sb.SceneError, match="is not a body"):
         sb.ball(None, 3, at=(0.0, 0.0, 0.0))  # type: ignore[arg-type]
     with pytest.raises(sb.SceneError, match="tilt_damping: acts where the axis gives way, and it is rigid"):
         gate(9.81, tilt_damping=0.1)

@@ -117,7 +117,7 @@ def test_its_unit_holds_and_the_json_tells_the_rest(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("damage", "words"),
     [
-        (lambda data: b"RIFF" + data[4:], "is no C3D file"),
+        (lambda data: b"RIFF" + data[4:], "is not a C3D file"),
         (lambda data: data[:600], "is damaged or cut off"),
         (lambda data: data[:-9], "is damaged or cut off"),
         (lambda data: data[:515] + b"\x63" + data[516:], "is damaged or cut off"),

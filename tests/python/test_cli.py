@@ -499,4 +499,4 @@ def test_numbers_of_options_say_what_they_got(arguments: list[str], words: str) 
 def test_numbers_of_options_are_read_as_before() -> None:
     done = CliRunner().invoke(app, ["new", "none.csv", "--density", "-1e-3"])
     assert "--density: must be positive" in done.output
-    assert "no file" in CliRunner().invoke(app, ["new", "none.csv", "--density=.5"]).output
+    assert "is not a file" in CliRunner().invoke(app, ["new", "none.csv", "--density=.5"]).output

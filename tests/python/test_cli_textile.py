@@ -136,7 +136,7 @@ def test_a_loop_of_bending_tells_a_cloth_that_yields(tmp_path):
         (["--length", "20cm", "--width", "5cm", "--pretension", "1 kg/N"], "--pretension: must be"),
         (["--length", "20cm", "--width", "5cm", "--pretension", "50N"], "never reaches the pretension"),
         (["--length", "20cm", "--width", "5cm", "--column", "load"], "--column: must be ROLE=VALUE"),
-        (["--length", "20cm", "--width", "5cm", "--cycle", "3"], "cycle: is none of the 1"),
+        (["--length", "20cm", "--width", "5cm", "--cycle", "3"], "cycle: is not one of the 1"),
     ],
 )
 def test_what_is_wrong(told, message, tmp_path):

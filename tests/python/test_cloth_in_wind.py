@@ -53,7 +53,7 @@ def test_six_numbers_are_found_from_far(tmp_path: Path, made: ModuleType) -> Non
         assert found[name].lower <= truth <= found[name].upper, found[name]
         weak = name in ("cloth_bending", "cloth_air_tangential")  # of so short a recording
         assert found[name].verdict in (("identified", "weak") if weak else ("identified",)), found[name]
-    assert "a Jacobian took" in found.report() and "at the start" in found.report()
+    assert "time per Jacobian" in found.report() and "at the start" in found.report()
 
 
 @pytest.mark.slow

@@ -119,7 +119,7 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
     np.savez(tmp_path / "markers.npz", positions=np.zeros((2, 3, 3)), times=np.arange(2.0))
     with pytest.raises(sb.RecordingError, match="lacks points and counts"):
         sb.Cloud.load(tmp_path / "markers.npz")
-    with pytest.raises(sb.RecordingError, match="is no file"):
+    with pytest.raises(sb.RecordingError, match="is not a file"):
         sb.Cloud.load(tmp_path / "none.npz")
     with pytest.raises(sb.RecordingError, match="no reader of clouds knows"):
         sb.Cloud.load(tmp_path / "take.csv")

@@ -174,13 +174,13 @@ def test_one_command_fits_all_and_does_nothing_twice(ropes: Path) -> None:
     codes = last_line(told)["fits"]
     bad = {name: code == 2 for name, code in codes.items()}
     assert bad == {str(none): True, "a": False, "b": False, "c": True, "d": False}
-    assert told.exit_code == 2 and f"{none}: is no valid TOML" in told.stderr
-    assert last_line(run("fit", ropes / "none*.toml", "--json"))["error"]["problem"].startswith("is no valid TOML")
-    assert (out / "none" / "error.txt").read_text().startswith(f"{none}: is no valid TOML")
+    assert told.exit_code == 2 and f"{none}: is not valid TOML" in told.stderr
+    assert last_line(run("fit", ropes / "none*.toml", "--json"))["error"]["problem"].startswith("is not valid TOML")
+    assert (out / "none" / "error.txt").read_text().startswith(f"{none}: is not valid TOML")
     without = last_line(run("collect", out, "--output", ropes / "part", "--json"))["without"]
     assert list(without) == ["c", "none"] and "lost.npz" in without["c"]
     alone = last_line(run("collect", out / "none", "--json"))["error"]
-    assert f"hold no fit.json; none: {none}: is no valid TOML" in alone["problem"]
+    assert f"hold no fit.json; none: {none}: is not valid TOML" in alone["problem"]
     none.unlink()
     (out / "none" / "error.txt").unlink()
     before = {name: (out / name / "fit.json").stat().st_mtime_ns for name in "abd"}
@@ -249,7 +249,7 @@ def test_ctrl_c_while_workers_fit_keeps_what_is_done(ropes: Path, tmp_path: Path
     with console.capture() as told:
         found = fit_all(console, [str(ropes / "[ab].toml")], tmp_path, False, _single, Interrupted())
     assert found.code is Code.INTERRUPTED and found.data["fits"]["b"] == 130
-    assert "interrupted: the same command goes on from here" in told.get()
+    assert "interrupted: the same command continues from here" in told.get()
     assert (tmp_path / "a" / "fit.json").is_file() and not (tmp_path / "b").exists()
 
 

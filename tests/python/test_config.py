@@ -639,7 +639,7 @@ def test_a_scene_starts_before_its_recording_where_start_time_says_so(folder: Pa
 def test_missing_and_binary_files(folder: Path) -> None:
     with pytest.raises(sb.ConfigError, match=r"is a recording.*sheetbend new swing\.npz"):
         load(folder / "swing.npz")
-    with pytest.raises(sb.ConfigError, match="is no file"):
+    with pytest.raises(sb.ConfigError, match="is not a file"):
         load(folder / "nowhere.toml")
     (folder / "binary.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(sb.ConfigError, match="UTF-8"):

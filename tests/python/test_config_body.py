@@ -106,11 +106,11 @@ def test_configured_cable_with_plug_and_flap_is_fitted(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "match"),
     [
-        ('upper = "plug"', 'upper = "plgu"', "no body of the scene"),
-        ('body = "plug"\nposition', 'body = "plgu"\nposition', "no body of the scene"),
+        ('upper = "plug"', 'upper = "plgu"', "is not a body of the scene"),
+        ('body = "plug"\nposition', 'body = "plgu"\nposition', "is not a body of the scene"),
         ("axis = [0.0, 1.0, 0.0]\n", "", "without axis"),
         ("stiffness = 1e-3", "compliance = 1e-3", "hinge with compliance"),
-        ("stiffness = 1e-3", "limits = [0.5, -0.5]", r"scene.joint\[0\].*are no range"),
+        ("stiffness = 1e-3", "limits = [0.5, -0.5]", r"scene.joint\[0\].*are not a range"),
         ("stiffness = 1e-3", "limits = [0.1, 0.5]", "0.1 rad outside"),
         ("stiffness = 1e-3", "limits = [0.5]", "limits"),
         ("stiffness = 1e-3", "limit_damping = 0.1", "acts at limits, and there are none"),
@@ -233,12 +233,12 @@ def test_a_configured_slider_has_a_spring_and_a_damper(tmp_path: Path) -> None:
     [
         ("values = [0.1, -0.2]", "values = [0.1]", "different numbers"),
         ("rotor = 1e-5", "", "rotor"),
-        ('starts_on = "shown"', 'starts_on = "other"', "no tool of the scene"),
+        ('starts_on = "shown"', 'starts_on = "other"', "is not a tool of the scene"),
         ('starts_on = "shown"', 'starts_on = "shown"\nat = [0.0, 0.0, 0.0]', "has at"),
         ('starts_on = "shown"\n', "", "no tool for it"),
         ('body = "lower"\npoint', "point", "on nothing"),
         ('body = "lower"\npoint', 'body = "box"\nparticles = ["box"]\npoint', "particles and a body"),
-        ('body = "lower"\npoint', 'body = "other"\npoint', "no body of the scene"),
+        ('body = "lower"\npoint', 'body = "other"\npoint', "is not a body of the scene"),
     ],
 )
 def test_mistakes_in_servos_starts_and_forces_are_told(tmp_path: Path, old: str, new: str, match: str) -> None:
@@ -312,7 +312,7 @@ def test_a_cloth_and_particles_with_drag_are_attached_to_a_body(tmp_path: Path) 
     rate = scene.bodies["pole"].angular_velocity(motion)[1, 0]
     assert rate == pytest.approx(2.0 / (1.0 + 2.0 * 0.2 * 1e-3 / moment), rel=2e-3)
     for old, new, words in (
-        ('body = "pole"', 'body = "none"', "no body of the scene"),
+        ('body = "pole"', 'body = "none"', "is not a body of the scene"),
         ("drag = 1e-3", "pinned = true", r"^scene.particles\[0\].particles: cannot fix these"),
     ):
         (tmp_path / "wrong.toml").write_text(ON_A_BODY.replace(old, new))
@@ -329,6 +329,8 @@ def test_a_wrist_that_holds_a_body_weighs_its_load(tmp_path: Path) -> None:
     hand = scene.add_body("hand", of=sb.Inertia.box(1e-3, (0.02,) * 3), poses=sb.Tool(times, places, quaternions))
     load = scene.add_body("load", of=sb.Inertia.box(0.3, (0.05, 0.05, 0.08)), at=(0.0, 0.0, -0.05))
     sb.fixed(hand, load, at=(0.0, 0.0, -0.01), name="grasp")
+    size = {"length": 0.1, "segments": 2, "density": 1e-3, "EI": 1e-4, "GJ": 1e-4}
+    sb.add_rod(scene, "cable", **size, start=load.point((0.0, 0.0, -0.04), along=(0.0, 0.0, -1.0)))  # type: ignore[arg-type]
     wrist = sb.simulate_forces(scene, times[1:], hand, solver)
     same = sb.simulate_forces(scene, times[1:], hand.particles.tolist(), solver)
     assert (wrist.forces == same.forces).all()
@@ -336,6 +338,9 @@ def test_a_wrist_that_holds_a_body_weighs_its_load(tmp_path: Path) -> None:
     sb.Recording(load.pose(sb.simulate(scene, times, solver))[0][:, None], times).save(tmp_path / "seen.npz")
     (tmp_path / "held.toml").write_text(HELD, encoding="utf-8")
     study = config.load(tmp_path / "held.toml")
+    rod = study.experiments[0].scene.ropes["cable"]
+    along = sb.simulate(study.experiments[0].scene, [0.0], solver).positions[0, rod.particles]
+    assert along == pytest.approx(np.linspace([0.0, 0.0, -0.09], [0.0, 0.0, -0.19], 3), abs=1e-15)  # as its grip points
     found = sb.fit(study.experiments, parameters=study.parameters, refine=False)
     assert found.values["load_mass"] == pytest.approx(0.3, rel=1e-6)
     (tmp_path / "held.toml").write_text(HELD.replace('at = ["hand"]', 'at = ["load"]'), encoding="utf-8")
@@ -381,6 +386,20 @@ name = "grasp"
 upper = "hand"
 lower = "load"
 at = [0.0, 0.0, -0.01]
+
+[[scene.rod]]
+name = "cable"
+length = 0.1
+segments = 2
+density = 1e-3
+EI = 1e-4
+GJ = 1e-4
+
+[[scene.rod.grip]]
+at = "start"
+body = "load"
+position = [0.0, 0.0, -0.04]
+direction = [0.0, 0.0, -1.0]
 
 [[marker]]
 marker = 0

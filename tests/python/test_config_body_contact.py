@@ -115,14 +115,14 @@ def test_a_box_that_slides_tells_its_friction(tmp_path: Path) -> None:
     [
         ('of = "box"', 'of = "bxo"', "contact.0..of: names no rope, cloth, set of particles or body"),
         ('of = "box"', 'of = ["box", "cord"]', "contact.0..of: names a body beside others"),
-        ('of = "box"', 'of = "cord"\npoints = [[0.0, 0.0, 0.0]]', "contact.0..points: are given.*no body"),
+        ('of = "box"', 'of = "cord"\npoints = [[0.0, 0.0, 0.0]]', "contact.0..points: are given.*not a body"),
         (CONTACT, CONTACT + "points = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]\n", "at one place twice"),
         (
             "box = [0.1, 0.08, 0.06]",
             "inertia = [3e-4, 4e-4, 5e-4]",
             "contact.0..points: are missing: the body has no box",
         ),
-        ('collider = "table"', 'collider = "floor"', "is no collider"),
+        ('collider = "table"', 'collider = "floor"', "is not a collider"),
         ("0.0, 0.03]", "0.0, 0.02]", "inside 'table', which is 0.01 m deep.*settle = true"),
         ('method = "implicit"\n', 'method = "direct"\n', "solver.method"),
     ],

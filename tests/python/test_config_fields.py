@@ -237,4 +237,4 @@ def test_missing_out_of_range_and_not_finite(tmp_path: Path, place: Place, name:
 @pytest.mark.parametrize(("place", "name"), FIELDS)
 def test_a_misspelled_key_is_guessed(tmp_path: Path, place: Place, name: str) -> None:
     error = refused(tmp_path, place, f"{name}x", 1.0)
-    assert error.problem == "is no known key" and name in error.fix
+    assert error.problem == "is not a known key" and name in error.fix

@@ -71,10 +71,10 @@ def test_a_bar_is_fitted_from_a_configuration(tmp_path: Path) -> None:
     [
         ({"cells": None}, "no mesh"),
         ({"file": "bar.msh"}, "box of another mesh"),
-        ({"pinned": ["left"]}, "no set"),
+        ({"pinned": ["left"]}, "not a set"),
         ({"poisson": 0.5}, "poisson"),
         ({"set": [{"name": "far", "lower": [1, 1, 1], "upper": [2, 2, 2]}]}, "no vertex"),
-        ({"size": None, "cells": None, "origin": None, "file": "missing.msh"}, "no file"),
+        ({"size": None, "cells": None, "origin": None, "file": "missing.msh"}, "not a file"),
     ],
 )
 def test_what_is_refused(tmp_path: Path, change: dict[str, Any], match: str) -> None:
@@ -140,7 +140,7 @@ def test_a_face_is_fixed_to_a_body(tmp_path: Path) -> None:
     kept = scene.positions[face] - [0.0, 0.01, 0.51]
     assert motion.positions[1, face] == approx(origin[1] + kept @ frame[1].T, abs=1e-9)
     assert frame[1, 2, 0] < -0.2  # it swings down
-    for wrong, match in (({"set": "left"}, "no set"), ({"body": "none"}, "no body")):
+    for wrong, match in (({"set": "left"}, "not a set"), ({"body": "none"}, "not a body")):
         with pytest.raises(sb.ConfigError, match=match):
             made(given | {"grip": [given["grip"][0] | wrong]})
 
@@ -157,7 +157,7 @@ def test_a_weight_hangs_on_the_mean_of_a_face(tmp_path: Path) -> None:
     face = motion.positions[1, bar.particles[bar.mesh.sets["x_max"]]]
     (place,) = loaded.experiments[0].markers.values()
     assert motion.positions[1, list(place.particles)][0] == approx(face.mean(axis=0), abs=1e-9)
-    for wrong, match in (({"set": "left"}, "no set"), ({"name": "bar"}, "is taken")):
+    for wrong, match in (({"set": "left"}, "not a set"), ({"name": "bar"}, "is taken")):
         own = BOX | {"mean": [{"name": "tip", "set": "x_max"} | wrong]}
         with pytest.raises(sb.ConfigError, match=match):
             study(tmp_path, own, scene_more, marker=marker, recording=[{"file": "bar.npz"}])

@@ -145,7 +145,7 @@ def test_shapes_refuse_what_they_cannot_be():
         with pytest.raises(sb.SceneError):
             build()
     scene = rope_above()
-    with pytest.raises(sb.SceneError, match="is no shape"):
+    with pytest.raises(sb.SceneError, match="is not a shape"):
         scene.add_contact([0], "table", friction=0.1)
     with pytest.raises(sb.SceneError, match="taken"):
         scene.add_contact([0], sb.Plane(name="table"), friction=0.1)

@@ -129,7 +129,7 @@ def test_the_report_tells_what_touches_and_where_motions_have_kinks() -> None:
     assert (
         "11 of 12" in report
         and "< 0.001 mm" in report
-        and "drag or damping that the model lacks is looked for to first order" in " ".join(report.split())
+        and "the search for a drag or damping that the model lacks is linear" in " ".join(report.split())
     )
     assert sb.FitResult.from_dict(result.to_dict()) == result
 

@@ -122,7 +122,7 @@ def test_what_is_no_solid_is_refused(ball: sb.DistanceField, tmp_path: Path):
         sb.DistanceField(whole, spacing=20 * RADIUS)  # no grid point is inside: nothing would touch it
     with pytest.raises(sb.SceneError, match="must be positive"):
         sb.DistanceField(whole, margin=0.0)
-    with pytest.raises(sb.SceneError, match="is no mesh"):
+    with pytest.raises(sb.SceneError, match="is not a mesh"):
         sb.DistanceField("hand.stl")
     scene = sb.Scene("far")
     scene.add_particles([[0.0, 0.0, 1.0]], 0.1)

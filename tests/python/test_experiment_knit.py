@@ -149,7 +149,7 @@ def test_ratios_are_found(ratios):
     assert "parts of the data contradict each other" in ratios["knit_shear"].words
     assert ratios["knit_poisson"].value == approx(0.42, abs=0.04)
     assert ratios["knit_weft"].value == approx(0.5, abs=0.1)
-    assert ratios["knit_shear"].verdict == "doubtful" and "else weak" in ratios["knit_shear"].words
+    assert ratios["knit_shear"].verdict == "doubtful" and "otherwise weak" in ratios["knit_shear"].words
 
 
 def test_unseen_stills_are_a_third_nearer_than_harmonic(stretched, ratios):

@@ -121,7 +121,7 @@ def test_with_pushes_friction_and_drag_of_both_thirds_agree(pushed: tuple[sb.Fit
     for name in ("arm_friction", "arm_drag"):
         one, other = first[name], last[name]
         assert max(one.lower, other.lower) < min(one.upper, other.upper), (str(one), str(other))
-        assert "such as small pushes along the motion, which `shooting` counts" in single[name].words
+        assert "such as small pushes along the motion (`shooting` allows for them)" in single[name].words
         assert "pushes" not in one.words + other.words
     for fit in pushed:
         (found,) = fit.result.shot

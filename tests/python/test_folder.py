@@ -56,7 +56,7 @@ def test_recordings_without_a_name_take_that_of_their_file(tmp_path: Path) -> No
 
 def test_a_folder_without_recordings_is_refused(tmp_path: Path) -> None:
     dataset(tmp_path / "rope", "train/1.pkl", "test/1.pkl")
-    with pytest.raises(sb.RecordingError, match=r"folder: is no folder .*eval.* rope holds test, train"):
+    with pytest.raises(sb.RecordingError, match=r"folder: is not a folder .*eval.* rope holds test, train"):
         sb.read_recordings(tmp_path / "rope" / "eval")
     shutil.rmtree(tmp_path / "rope")
     with pytest.raises(sb.RecordingError, match=r"holds no recording that matches '\*' \(got \[\]\)"):

@@ -165,7 +165,7 @@ class TestUsd:
         assert root.GetAttribute("sheetbend:cloth_warp").GetDocumentation() == "N/m"
 
     def test_bad_names(self, scene: sb.Scene, motion: sb.Trajectory, tmp_path: Path) -> None:
-        with pytest.raises(sb.InputError, match="no USD file"):
+        with pytest.raises(sb.InputError, match="not a USD file"):
             write_usd(tmp_path / "m.obj", scene, motion)
 
 

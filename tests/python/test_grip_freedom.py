@@ -84,8 +84,8 @@ def test_a_start_is_moved_whole() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"lead": 0.7}, "no part of the rope"),
-        ({"lead": 1e-3}, "no part of the rope"),
+        ({"lead": 0.7}, "not a part of the rope"),
+        ({"lead": 1e-3}, "not a part of the rope"),
         ({"end_lead": 0.1}, "needs a grip"),
     ],
 )

@@ -255,7 +255,7 @@ class TestClimb:
         assert not climb._climbed(MARKERS) and tried == []
         (step,) = climb.steps
         assert not step.stays and step.ratio is not None and step.ratio > 0.99 and step.count == 4
-        assert "one step promises" in said[-1]
+        assert "one step predicts" in said[-1]
 
     def test_what_promises_much_is_tried(self) -> None:
         model = replace(MODEL, shifts=True)
@@ -446,7 +446,7 @@ class TestClimb:
         climb._keep(YIELD, lost, sb.gripped.judging.verdict(lost.errors, before.errors), 0.0)
         climb._keep(YIELD, None, None, 0.0)
         assert climb.rope is before and [s.stays for s in climb.steps] == [True, False, False]
-        assert said[-1] == "yield: diverges, does not stay"
+        assert said[-1] == "yield: diverges, is not kept"
 
 
 class TestConclusion:
@@ -465,7 +465,7 @@ class TestConclusion:
         )
         rests_on = {p.name: p.sd for p in found.fit.result.premises}
         assert rests_on["rope_density"] > 0.0 and "mass of each marker" not in rests_on  # which the density's error has
-        (at,) = (k for k, text in enumerate(said) if text.startswith("the fit that counts, to 16 windows of 0.06 s"))
+        (at,) = (k for k, text in enumerate(said) if text.startswith("the last fit, to 16 windows of 0.06 s"))
         assert said[at + 1].startswith("which takes about ")
 
     @pytest.mark.slow
@@ -475,7 +475,7 @@ class TestConclusion:
         motions = [shown(f"{k}").frames(slice(0, 25)) for k in range(13)]
         given = {"density": 0.06, "ladder": [TWIST], "bending_lengths": (0.3,), "max_segments": 12}
         fit_rope(motions, **given, windows="all", say=said.append)  # type: ignore[arg-type]
-        assert any(text.startswith("the fit that counts, to 13 windows") for text in said)
+        assert any(text.startswith("the last fit, to 13 windows") for text in said)
         few, every = (int(text.split()[2]) for text in said if text.startswith(("ended after", "not ended after")))
         assert every <= few
         first = next(text for text in said if not text.startswith("doubtful"))  # before work starts

@@ -172,7 +172,7 @@ READ: dict[str, tuple[Callable[[Folder], object], int, tuple[str, ...]]] = {
     ),
     "a marker lost in one file": (lambda f: f.each(lambda x: without(x, 5), ("01",)), 4, ("it has 11 markers",)),
     "a marker lost in all files": (lambda f: f.each(lambda x: without(x, 5)), 5, ("m5 of 12 markers is never seen",)),
-    "a grip lost in one file": (lambda f: f.each(lambda x: without(x, [0, 1]), ("01",)), 4, (LEFT, "no two grips")),
+    "a grip lost in one file": (lambda f: f.each(lambda x: without(x, [0, 1]), ("01",)), 4, (LEFT, "not two grips")),
     "grips first": (lambda f: f.each(lambda x: frames(x[:, GRIPS_FIRST])), 5, ("its markers are in the order",)),
     "grips last": (lambda f: f.each(lambda x: frames(x[:, GRIPS_LAST])), 5, ("its markers are in the order",)),
     "free markers shuffled in one": (
@@ -228,7 +228,7 @@ READ: dict[str, tuple[Callable[[Folder], object], int, tuple[str, ...]]] = {
     "one file cut off": (
         lambda f: f.put("train/01.pkl", pickled(TRAIN["01"])[:5000]),
         4,
-        ("01.pkl is left out: it is no pickle, or a damaged one",),
+        ("01.pkl is left out: it is not a pickle, or a damaged one",),
     ),
     "one file of text": (lambda f: f.put("train/01.pkl", b"see the other folder"), 4, ("01.pkl is left out",)),
     "files of the system": (
@@ -327,7 +327,7 @@ REFUSED: dict[str, tuple[Callable[[Folder], object], str, str]] = {
     ),
     "validation called test": (
         lambda f: (f.root / "eval").rename(f.root / "test"),
-        "is no folder",
+        "is not a folder",
         "holds test, train",
     ),
     "sessions": (

@@ -214,7 +214,7 @@ BAD = {
     "no such marker": ('at = "start"\nmarkers = ["thumb"]', "unknown marker"),
     "a line": ('at = "start"\nmarkers = ["r1", "r2", "r3"]', "on one line"),
     "position": ('at = "start"\nmarkers = ["grip"]\nposition = [0, 0, 0]', "give the offset"),
-    "no tool": ('at = "start"\ntool = "robot"', "no tool of the scene"),
+    "no tool": ('at = "start"\ntool = "robot"', "is not a tool of the scene"),
 }
 
 

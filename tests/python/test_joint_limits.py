@@ -200,8 +200,8 @@ def test_a_stop_that_is_never_reached_is_not_identified() -> None:
 @pytest.mark.parametrize(
     ("options", "match"),
     [
-        ({"limits": (0.5, -0.5)}, r"hinge.limits: are no range.*give \(low, high\)"),
-        ({"limits": (0.5, 0.5)}, "are no range"),
+        ({"limits": (0.5, -0.5)}, r"hinge.limits: are not a range.*give \(low, high\)"),
+        ({"limits": (0.5, 0.5)}, "are not a range"),
         ({"limits": (0.2, 0.5)}, "do not include 0.*0.2 rad outside"),
         ({"limits": (-0.5, -0.1)}, "do not include 0.*0.1 rad outside"),
         ({"limits": (-4.0, 4.0)}, "a whole turn or more"),

@@ -50,7 +50,7 @@ def test_semicolons_and_decimal_commas(tmp_path: Path) -> None:
     assert np.allclose(got.positions, 1e-3 * X, rtol=0, atol=1e-15) and got.times.tolist() == TIMES
     mixed = "time;a_x;a_y;a_z\n0;1,5;2.5;3\n"
     (tmp_path / "take.csv").write_text(mixed)
-    with pytest.raises(RecordingError, match=r"line 2: holds a cell that is no number .*point"):
+    with pytest.raises(RecordingError, match=r"line 2: holds a cell that is not a number .*point"):
         Recording.load(tmp_path / "take.csv")
 
 
@@ -335,7 +335,7 @@ def test_a_header_of_several_rows(tmp_path: Path, header: str) -> None:
 def test_units_that_contradict_the_header_are_refused(tmp_path: Path, header: str) -> None:
     """The row below was passed over, and times in ms were taken as s."""
     (tmp_path / "take.csv").write_text(f"{header}\n0;1;2;3\n10;1;2;3\n")
-    with pytest.raises(RecordingError, match="line 2: holds a cell that is no number"):
+    with pytest.raises(RecordingError, match="line 2: holds a cell that is not a number"):
         Recording.load(tmp_path / "take.csv")
     same = header.replace("\nms", "\ns").replace("s;m;m;m", "s;mm;mm;mm")
     (tmp_path / "take.csv").write_text(f"{same}\n0;1;2;3\n10;1;2;3\n")
@@ -410,7 +410,7 @@ def test_quoted_decimal_commas_between_commas(tmp_path: Path) -> None:
     got = Recording.load(file)
     assert got.positions[:, 0].tolist() == [[0.5, 0.25, 3.0], [0.5, -0.25, 3.0]] and got.times.tolist() == [0.0, 0.01]
     file.write_text('time,a_x,a_y,a_z\n0,"1,040",250,3\n')  # a thousand, or one and a bit?
-    with pytest.raises(RecordingError, match="holds a cell that is no number"):
+    with pytest.raises(RecordingError, match="holds a cell that is not a number"):
         Recording.load(file)
 
 

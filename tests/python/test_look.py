@@ -383,7 +383,7 @@ file = "take.csv"
     (tmp_path / "long.toml").write_text(text)
     with pytest.raises(sb.ConfigError, match=r'recording\[0\].units: .* 7\d\d.* m apart .*give units = "mm"'):
         config.load(tmp_path / "long.toml")
-    assert "say units = mm" in run("info", tmp_path / "take.csv").stdout
+    assert "write units = mm" in run("info", tmp_path / "take.csv").stdout
     (tmp_path / "long.toml").write_text(text + 'units = "m"\n')
     assert config.load(tmp_path / "long.toml").experiments  # where it is so
 

@@ -66,6 +66,30 @@ def test_a_box_that_is_pushed_over_a_table_is_no_rope(finger: bool) -> None:
         kind(x if finger else x[:, :4], t)
 
 
+@pytest.mark.parametrize("what", ["door", "swing", "bar on a wire"])
+def test_a_draft_of_a_body_that_turns_on_something_says_that_nothing_bends(what: str) -> None:
+    """A door was drafted as a beam that swings at 3 Hz, a seat on two ropes as a cloth, a bar on a wire as a rope on a
+    table, without a word."""
+    t = np.arange(301) / 60
+    angle = {"door": 2.0 * (1.0 - np.exp(-1.2 * t)), "swing": 0.4 * np.cos(3.5 * t)}.get(what, 1.2 * np.cos(2.2 * t))
+    c, s, zero, one = np.cos(angle), np.sin(angle), 0.0 * t, 1.0 + 0.0 * t
+    about_z = np.moveaxis(np.array([[c, -s, zero], [s, c, zero], [zero, zero, one]]), 2, 0)
+    about_y = np.moveaxis(np.array([[c, zero, s], [zero, one, zero], [-s, zero, c]]), 2, 0)
+    door = [[0.1, 0.02, 0.4], [0.7, 0.02, 0.4], [0.7, 0.02, 1.6], [0.1, 0.02, 1.6], [0.4, 0.02, 1.0]]
+    frame = [[-0.05, 0.0, 0.3], [-0.05, 0.0, 1.8], [-0.06, 0.05, 1.0]]
+    ropes = [[0.0, y, -z] for y in (-0.2, 0.2) for z in (0.26, 0.53, 0.8)]
+    still, moving, turns = {
+        "door": (frame, door, about_z),
+        "swing": ([[0.0, -0.2, 0.0], [0.0, 0.2, 0.0]], [*ropes, [0.05, -0.15, -0.8], [-0.05, 0.15, -0.8]], about_y),
+        "bar on a wire": ([[0.0, 0.0, 0.7]], [[0.1, 0.0, 0.0], [-0.1, 0.0, 0.0], [0.05, 0.02, 0.02]], about_z),
+    }[what]
+    x = np.concatenate([np.tile(still, (len(t), 1, 1)), np.einsum("fab,kb->fka", turns, np.array(moving))], axis=1)
+    recording = sb.Recording(x + 2e-4 * np.random.default_rng(0).standard_normal(x.shape), t)
+    found = draft([Take(seen(recording), "take.csv")], "take")
+    assert found.kind != "a beam clamped at one end"
+    assert any("all markers that move keep their places on one rigid body" in words for words in found.unknown)
+
+
 @pytest.mark.parametrize("which", ["bob", "small", "cone"])
 def test_a_pendulum_without_its_pivot_or_out_of_a_plane(which: str) -> None:
     """A stranger was told to record three markers on a rope, or to measure a beam."""

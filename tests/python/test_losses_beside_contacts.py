@@ -93,7 +93,7 @@ def test_a_drag_that_is_missing_makes_the_friction_doubtful(drag: float, off: fl
     friction = result["table_friction"]
     assert friction.half_width is not None and friction.value - 0.3 > off * friction.half_width
     assert friction.verdict == "doubtful" and "it had a drag_linear of" in friction.words
-    assert any("N s/m for every kg, which the model lacks" in words for words in result.warnings)
+    assert any("N s/m per kg, which the model lacks" in words for words in result.warnings)
 
 
 def test_a_damping_that_is_missing_is_named_with_its_size() -> None:

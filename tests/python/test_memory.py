@@ -182,7 +182,7 @@ def test_amounts_of_memory(amount: object, size: int) -> None:
 
 @pytest.mark.parametrize("amount", ["", "2", "GB", "-1 GB", "2 XB", 0, -5, float("nan"), float("inf"), True, [1]])
 def test_what_is_no_amount_is_refused(amount: object) -> None:
-    with pytest.raises(sb.InputError, match=re.escape("solver.memory: is no amount of memory")):
+    with pytest.raises(sb.InputError, match=re.escape("solver.memory: is not an amount of memory")):
         sb.Solver(memory=amount)  # type: ignore[arg-type]
 
 

@@ -149,7 +149,7 @@ def test_texture_coordinates_of_another_size_are_refused_with_the_size_that_fits
     ("name", "content", "options", "message"),
     [
         ("mesh.off", "", {}, "path: has a suffix that no reader knows .*use one of .obj, .ply, .stl"),
-        ("mesh.obj", None, {}, "mesh.obj: is no file"),
+        ("mesh.obj", None, {}, "mesh.obj: is not a file"),
         ("mesh.obj", "v 0 0 0\nv 1 0 0\n", {}, "has no triangles"),
         ("mesh.ply", "not a mesh", {}, "cannot be read"),
         ("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", {}, "cannot be read|vertices that do not exist"),

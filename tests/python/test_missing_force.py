@@ -54,7 +54,7 @@ def test_a_center_that_makes_up_for_a_force_is_doubtful() -> None:
     found = fitted(0.4)
     center, inertia = found["box_center_z"], found["box_inertia_2"]
     assert center.half_width is not None and abs(center.value) > 3 * center.half_width
-    assert center.verdict == "doubtful" and "rests on there being no other force" in center.words
+    assert center.verdict == "doubtful" and "assumes that no other force acts" in center.words
     assert "1 % of what" not in center.words
     assert inertia.verdict == "identified" and abs(inertia.value / 6.6666667e-4 - 1) < 0.02
 

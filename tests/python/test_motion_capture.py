@@ -82,7 +82,7 @@ def test_the_json_beside_a_take_tells_the_rest(tmp_path: Path) -> None:
         ("Length Units,Feet", {}, "export in Meters, Centimeters, Millimeters"),
         ("Length Units,Meters", {"Frame,": "Index,"}, "no rows of types, names and axes"),
         ("Length Units,Meters", {"Position": "Speed"}, "line 7: has no columns X, Y, Z of a marker or rigid body"),
-        ("Length Units,Meters", {"1202.000000": "12o2"}, "line 10: holds a cell that is no number"),
+        ("Length Units,Meters", {"1202.000000": "12o2"}, "line 10: holds a cell that is not a number"),
         ("Length Units,Meters", {"3,0.025000,": "3,"}, "line 11: must have"),
     ],
 )
@@ -176,7 +176,7 @@ def test_a_take_of_the_first_motive(tmp_path: Path) -> None:
     [
         (',9,""\r\nrigidbody', "\r\nrigidbody", "line 8: is cut off"),
         ("0,0.0,1,1", "0,0.0,1.5,1", "line 8: must hold a whole number"),
-        ("1.5,2", "x,2", "line 10: .*no number"),
+        ("1.5,2", "x,2", "line 10: .*not a number"),
         ("frame,2,0.02", "frame,2,0.01", "line 11: must have a time later"),
         ('5,6,7,9,""', '5,6,7,9,"tip"', "line 8: repeats a marker"),
     ],
@@ -217,7 +217,7 @@ def test_a_trial_of_vicon(tmp_path: Path) -> None:
     [
         ("Trajectories", "Model Outputs", "has no section Trajectories"),
         ("11,0,1,2,3,4,5,6,,,,0,0,0\r\n", "\r\n", "has no rate, names, axes, units and frames"),
-        ("s\r\n100", "s\r\nfast", "holds a cell that is no number"),
+        ("s\r\n100", "s\r\nfast", "holds a cell that is not a number"),
         (",,mm,mm,mm,mm", ",,mm,mm,mm,in", "must name one length unit"),
         ("12,0,1.5,2,3,", "12,0,1.5,2,", "line 14: must have 14 cells"),
         (",X,Y,Z,X,Y,Z,X,Y,Z,", ",A,Y,Z,A,Y,Z,A,Y,Z,", "has no columns X, Y, Z of a marker"),
@@ -270,7 +270,7 @@ def test_a_measurement_of_qtm(tmp_path: Path, changes: tuple) -> None:
         ("FREQUENCY\t100", "FREQUENCY\t0", "line 4: must be the frames per second"),
         ("MARKER_NAMES", "BODY_NAMES", "holds poses of rigid bodies"),
         ("2\t0.01000\t1.5", "2\t0.01000\t1.5\t7", "line 12: must have 6 cells for 2 markers"),
-        ("2\t0.01000\t1.5", "2\t0.01000\t1o5", "line 12: holds a cell that is no number"),
+        ("2\t0.01000\t1.5", "2\t0.01000\t1o5", "line 12: holds a cell that is not a number"),
         ("(?s)Frame.*", "", "has a header but no rows"),
     ],
 )

@@ -364,7 +364,7 @@ def test_an_end_at_a_kink_is_no_convergence(optimizer):
     fit = sb.fit(e, parameters=["clock"], optimizer=optimizer, profiles=False)
     assert fit["clock"].value == approx(0.0, abs=1e-6)  # 1 mm off, the least that it can be
     assert not fit.result.converged
-    assert "no step lowers the cost, though its slope promises 97 % less" in fit.result.message
+    assert "no step lowers the cost, but its gradient promises 97 % less" in fit.result.message
     assert any("did not converge: no step" in words for words in fit.result.warnings)
     assert "did NOT converge" in fit.report()
 

@@ -283,7 +283,7 @@ class TestCommands:
     @pytest.mark.parametrize(
         ("arguments", "words"),
         [
-            (["a.npz", "--output", "a.txt"], "is no HTML file"),
+            (["a.npz", "--output", "a.txt"], "is not an HTML file"),
             (["a.toml", "--units", "mm"], "is for recordings"),
             (["b.npz"], "b.npz"),
         ],

@@ -267,8 +267,8 @@ DOUBLE = b"cnumpy\ndtype\n(X\x02\x00\x00\x00f8\x89\x88tR"
         (b"\x80\x09N.", "protocol"),
         (b"N.N.", "goes on after the end.*2 bytes"),
         (b"](h\x00e.", "damaged"),
-        (b"time,a_x,a_y,a_z\n0,1,2,3\n", "no pickle"),
-        (b"\x93NUMPY\x01\x00v\x00", "no pickle"),
+        (b"time,a_x,a_y,a_z\n0,1,2,3\n", "not a pickle"),
+        (b"\x93NUMPY\x01\x00v\x00", "not a pickle"),
     ],
 )
 def test_a_damaged_or_forged_stream_is_refused(tmp_path: Path, content: bytes, words: str) -> None:

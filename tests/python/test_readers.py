@@ -131,12 +131,12 @@ def test_long_csv_columns_go_by_name(tmp_path: Path) -> None:
         ("time,a_x,a_y,b_x,b_z\n0,1,2,3,4\n", "line 1: has only x and y of a marker"),
         ("time,a_x,a_z,a_y\n0,1,2,3\n", r"line 1: must have the column 'a_y' there \(got 'a_z'\)"),
         ("time,a,b,c\n0,1,2,3\n", r"line 1: must have the column 'a_x' there \(got 'a'\). Fix: name the columns"),
-        ("time,a_x,a_y,a_z\n0,lost,lost,lost\n", r"line 2: holds a cell that is no number .*an empty cell or nan"),
+        ("time,a_x,a_y,a_z\n0,lost,lost,lost\n", r"line 2: holds a cell that is not a number .*an empty cell or nan"),
         ("time,a_x,a_y,a_z\n0,1,2,3\n1,1,2\n", r"line 3: must have 4 cells, like the header \(got 3\)"),
         ("time,a_x,a_y,a_z\n0,1,2,3\n1,1,2,3,4\n", "line 3: must have 4 cells"),
-        ("#\ntime,a_x,a_y,a_z\n0,1,2,3\n\n1,one,2,3\n", r"line 5: holds a cell that is no number .*'one'"),
-        ("time;a_x;a_y;a_z\n0;1,5;2.5;3\n", "line 2: holds a cell that is no number .*point"),
-        ("time,a_x,a_y,a_z\n0,1_0,2,3\n", r"line 2: .* no number .*1_0"),
+        ("#\ntime,a_x,a_y,a_z\n0,1,2,3\n\n1,one,2,3\n", r"line 5: holds a cell that is not a number .*'one'"),
+        ("time;a_x;a_y;a_z\n0;1,5;2.5;3\n", "line 2: holds a cell that is not a number .*point"),
+        ("time,a_x,a_y,a_z\n0,1_0,2,3\n", r"line 2: .* not a number .*1_0"),
         ("time,a_x,a_y,a_z\n0,inf,2,3\n", "line 2: holds an infinite number"),
         ("time,a_x,a_y,a_z\n0,1,2,3\n,1,2,3\n", "line 3: must have a time later"),
         ("time,a_x,a_y,a_z\n0,1,2,3\n-1,1,2,3\n", r"line 3: must have a time later .*'-1'"),
@@ -160,7 +160,7 @@ def test_bad_csv_is_refused_with_its_line(tmp_path: Path, text: str, words: str)
 def test_csv_that_is_no_text_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "picture.csv"
     path.write_bytes(b"\x89PNG\r\n\x1a\n\xff\xfe")
-    with pytest.raises(RecordingError, match="no UTF-8 text"):
+    with pytest.raises(RecordingError, match="not UTF-8 text"):
         Recording.load(path)
 
 
@@ -215,7 +215,7 @@ def test_bad_npz_is_refused(tmp_path: Path, arrays: dict, words: str) -> None:
 def test_npz_that_is_none_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "data.npz"
     path.write_text("time,a_x,a_y,a_z\n")
-    with pytest.raises(RecordingError, match="no NPZ archive"):
+    with pytest.raises(RecordingError, match="not an NPZ archive"):
         Recording.load(path)
     with path.open("wb") as file:
         np.save(file, X)
@@ -249,7 +249,7 @@ def test_damaged_npz_is_refused_or_reads_the_same(tmp_path: Path, data: st.DataO
 @pytest.mark.parametrize("suffix", [".npz", ".csv"])
 def test_missing_and_empty_files_are_refused(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"nothing{suffix}"
-    with pytest.raises(RecordingError, match=rf"nothing{suffix}: is no file"):
+    with pytest.raises(RecordingError, match=rf"nothing{suffix}: is not a file"):
         Recording.load(path)
     path.touch()
     with pytest.raises(RecordingError, match=r"is empty .*0 bytes"):
@@ -262,7 +262,7 @@ def test_missing_and_empty_files_are_refused(tmp_path: Path, suffix: str) -> Non
 
 def test_a_name_that_is_spelled_wrong_is_mended(tmp_path: Path) -> None:
     (tmp_path / "take_1.csv").write_text("time,a_x,a_y,a_z\n0,1,2,3\n")
-    with pytest.raises(RecordingError, match=r"tkae_1.csv: is no file .*Fix: did you mean .*take_1.csv\?"):
+    with pytest.raises(RecordingError, match=r"tkae_1.csv: is not a file .*Fix: did you mean .*take_1.csv\?"):
         Recording.load(tmp_path / "tkae_1.csv")
     with pytest.raises(RecordingError, match="Fix: give a path; relative paths start at "):
         Recording.load(tmp_path / "nowhere" / "take_1.csv")
@@ -323,12 +323,12 @@ def test_a_trc_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("PathFileType", "Path", "is no TRC file"),
+        ("PathFileType", "Path", "is not a TRC file"),
         ("\tmm\t", "\tinch\t", "line 3: names no length unit"),
         ("Frame#", "Index", "line 4: must begin with Frame#"),
         ("hand\t\t\ttip", "hand\t\ttip\t", "line 4: must name a marker in every third column"),
         ("X2\tY2", "Y2\tX2", "line 5: must name the axes"),
-        ("1.5", "1,5", "line 8: holds a cell that is no number"),
+        ("1.5", "1,5", "line 8: holds a cell that is not a number"),
         ("5\t7", "5\t7\t8", "line 9: must have at most 8 cells"),
     ],
 )

@@ -199,8 +199,8 @@ def test_hidden_spans_lose_free_markers_and_no_frame() -> None:
     for spans, words in (
         ([(5, 6)], r"hidden\[0\]: holds no frame \(got \(5, 6\)\).*0 to 1 s"),
         ([(0.1, 0.2), (0.4, 0.3)], r"hidden\[1\]: holds no frame"),
-        ([0.1, 0.2], r"hidden\[0\]: is no span.*give \(start, stop\)"),
-        ([(0.0, np.inf)], r"hidden\[0\]: is no span"),
+        ([0.1, 0.2], r"hidden\[0\]: is not a span.*give \(start, stop\)"),
+        ([(0.0, np.inf)], r"hidden\[0\]: is not a span"),
         ([(0.0, 0.5), (0.5, 2.0)], "hidden: leaves nothing seen"),
     ):
         with pytest.raises(RecordingError, match=words):

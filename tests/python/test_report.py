@@ -311,7 +311,9 @@ class TestAxesOfOthers:
 def test_a_sigma_in_millimeters_is_named(result: FitResult) -> None:
     """0.5 in place of 5e-4 passed without a word."""
     misfit = Misfit(reduced_chi_square=4e-6, smallest_sigma=0.5, largest_sigma=0.5, model_error=0.0)
-    assert "sigma: is 500 times the residuals. It is a length in m" in plain(dataclasses.replace(result, misfit=misfit))
+    assert "sigma: is 500 times the residuals. Check that it is in m" in plain(
+        dataclasses.replace(result, misfit=misfit)
+    )
     right = dataclasses.replace(misfit, reduced_chi_square=0.07)
     assert "times the residuals" not in plain(dataclasses.replace(result, misfit=right))
 

@@ -128,7 +128,7 @@ class TestResume:
         assert names <= {"journal.sqlite", "journal.sqlite-wal", ".running"} and "journal.sqlite" in names
         resumed = run("fit", config, "--resume")
         assert resumed.exit_code == 0, resumed.output
-        assert "goes on with" in resumed.stdout and " 0 evaluations" not in resumed.stdout
+        assert "continues with" in resumed.stdout and " 0 evaluations" not in resumed.stdout
         whole = json.loads(Path("whole/fit.json").read_text())
         assert results() == {key: value for key, value in whole.items() if key not in TIMED}
         assert {p.name for p in OUT.iterdir()} == WRITTEN
@@ -136,7 +136,7 @@ class TestResume:
     def test_after_ctrl_c_it_goes_on_to_the_end(self, config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         result = stopped(config, monkeypatch, KeyboardInterrupt())
         assert last_line(result)["interrupted"] and result.exit_code == 130
-        assert "--resume goes on from here" in result.stderr and (OUT / "journal.sqlite").exists()
+        assert "--resume continues from here" in result.stderr and (OUT / "journal.sqlite").exists()
         found = last_line(run("fit", config, "--json", "--resume"))
         assert found["converged"] and not found["interrupted"] and found["exit_code"] == 0
         assert not (OUT / "journal.sqlite").exists()
@@ -149,7 +149,7 @@ class TestResume:
 
         monkeypatch.setattr("sheetbend.cli.fit.run_fit", stops)
         result = run("fit", config)
-        assert result.exit_code == 130 and "--resume goes on from here" in result.stdout
+        assert result.exit_code == 130 and "--resume continues from here" in result.stdout
         assert (OUT / "journal.sqlite").exists() and not (OUT / "fit.json").exists()
 
     @pytest.mark.parametrize(
@@ -181,7 +181,7 @@ class TestResume:
         stopped(config, monkeypatch, KeyboardInterrupt())
         config.write_text(ROPE.replace('"none"', '"svg"').replace("[fit]", "[fit]\nthreads = 2"))
         result = run("fit", config, "--resume")
-        assert result.exit_code == 0 and "goes on with" in result.stdout
+        assert result.exit_code == 0 and "continues with" in result.stdout
 
     def test_without_a_journal_it_begins(self, config: Path) -> None:
         result = run("fit", config, "--resume")
@@ -191,7 +191,7 @@ class TestResume:
         stopped(config, monkeypatch, KeyboardInterrupt())
         config.write_text(ROPE.replace("segments = 6", "segments = 7"))
         result = run("fit", config)
-        assert result.exit_code == 0 and "begins anew: an unfinished run" in result.stdout
+        assert result.exit_code == 0 and "starts anew: the unfinished run" in result.stdout
 
     def test_the_old_spelling_names_the_new_one(self, config: Path) -> None:
         assert run("fit", config).exit_code == 0

@@ -277,7 +277,7 @@ def test_a_start_that_diverges_is_a_row_of_the_table(monkeypatch):
     assert starts[2].values["rope_EI"] == approx(1e3) and not starts[2].converged
     assert found["rope_EI"].value == approx(2e-3, rel=0.05)
     assert "1 diverged" in plain(found.result)
-    assert any("1 of 3 starts led nowhere" in words for words in found.result.warnings)
+    assert any("1 of 3 starts failed" in words for words in found.result.warnings)
     assert FitResult.from_dict(found.result.to_dict()) == found.result
 
 

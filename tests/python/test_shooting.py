@@ -336,7 +336,7 @@ def test_parts_of_a_shot_motion_ask_nothing_of_a_start_that_they_do_not_show() -
     found = sb.fit(e, parameters=list(WANTED), refine=False, profiles=False, beginnings=False)
     doubted = {name: found[name].words for name in WANTED if "contradict" in found[name].words}
     assert list(doubted) == ["arm_hinge_viscosity"]
-    assert "the third quarter of the time asks for" in doubted["arm_hinge_viscosity"]
+    assert "from the third quarter of the time, " in doubted["arm_hinge_viscosity"]
 
 
 def test_a_motion_that_loses_nothing_says_so_in_every_result(tmp_path: Path) -> None:

@@ -112,7 +112,7 @@ def test_files_that_are_no_solid(tmp_path):
     broken.write_text("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 2")
     with pytest.raises(sb.MeshError, match="holds less than its counts say"):
         sb.mesh.read_solid(broken)
-    with pytest.raises(sb.MeshError, match="no file"):
+    with pytest.raises(sb.MeshError, match="not a file"):
         sb.mesh.read_solid(tmp_path / "missing.msh")
     with pytest.raises(sb.MeshError, match="suffix"):
         sb.mesh.read_solid(tmp_path / "box.step")

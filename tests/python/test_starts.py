@@ -146,8 +146,8 @@ def test_raced_starts_that_diverge_are_rows(monkeypatch):
     assert len(starts) == 16 and 1 <= len(lost) <= 4 and starts[-len(lost) :] == tuple(lost)
     assert all(s.group is None and s.raced is None and s.first["rope_EI"] > 1.5e-2 for s in lost)
     assert found["rope_EI"].value == pytest.approx(2e-3, rel=0.05)
-    assert any(f"{len(lost)} of 16 starts led nowhere" in words for words in found.result.warnings)
-    assert f"led nowhere: {len(lost)} of 16" in found.report()
+    assert any(f"{len(lost)} of 16 starts failed" in words for words in found.result.warnings)
+    assert f"failed: {len(lost)} of 16" in found.report()
 
 
 def test_where_all_raced_starts_diverge_the_fit_says_why(monkeypatch):

@@ -266,7 +266,7 @@ def test_bad_arguments_are_refused() -> None:
         stepper(state, push=torch.zeros(3))
     with pytest.raises(sb.InputError, match="right shape"):
         stepper(state, force=torch.zeros(2, 3))
-    with pytest.raises(sb.InputError, match="is no State"):
+    with pytest.raises(sb.InputError, match="is not a State"):
         stepper(state.positions)
     with pytest.raises(sb.InputError, match="position"):
         stepper(state, position=state.positions)
@@ -288,7 +288,7 @@ def test_an_array_that_the_scene_lacks_is_refused_with_what_gives_it_one() -> No
     state = stepper.start()
     with pytest.raises(sb.InputError, match=r"force: cannot be given .*call scene\.add_force\(part"):
         stepper(state, force=torch.zeros(11, 3))
-    with pytest.raises(sb.InputError, match=r"inputs\.force: is no input array .*call scene\.add_force"):
+    with pytest.raises(sb.InputError, match=r"inputs\.force: is not an input array .*call scene\.add_force"):
         simulate(scene, [0.1], sb.Solver(h=1 / 200), inputs={"force": torch.zeros(1, 11, 3)})
     with pytest.raises(sb.InputError, match=r"forces: cannot be given .*give some of: mass"):
         stepper(state, forces=torch.zeros(11, 3))

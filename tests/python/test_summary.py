@@ -41,7 +41,7 @@ def told(result: FitResult) -> dict[str, str]:
 def test_a_good_fit(good: FitResult) -> None:
     assert told(good) == {
         "result": "the optimizer converged; 2 of 2 parameters are identified",
-        "fit": "the simulation misses the fitted data by 1 mm (rms), as the given noise explains",
+        "fit": "the simulation misses the fitted data by 1 mm (rms), as expected from the given noise",
         "prediction": "data that were not fitted are missed by 1.2 mm (rms); a prediction without physics misses them "
         "by 100 mm",
         "next": "use the values with their intervals",
@@ -124,7 +124,7 @@ def test_nothing_held_out_is_said(good: FitResult) -> None:
 
 @pytest.mark.parametrize(
     ("chi", "words"),
-    [(9.0, "3 times what the given noise explains"), (0.01, "less than the given noise explains")],
+    [(9.0, "3 times what the given noise explains"), (0.01, ", less than the given noise")],
 )
 def test_residuals_are_compared_with_the_given_noise(good: FitResult, chi: float, words: str) -> None:
     assert good.misfit is not None

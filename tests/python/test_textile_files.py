@@ -173,10 +173,10 @@ TABLE = "Time (s),Ext (mm),Load (N)\n"
         ("Ext (mm);Load (N)\n0,0;0\n1;0.5\n2.5;1.5\n3;2.5\n", {}, r"line 2, column 1 \(Ext\)", "decimal mark ','"),
         ("Ext (mm),Load (N)\n0,0,0,0\n0,5,1,25\n1,0,2,5\n", {}, "line 2", "twice the cells"),
         ("Ext (mm);Load (N)\n0,0;0,1\n1,0;2,5\n", {"decimal": "."}, "strip.csv", "holds no table"),
-        ("Ext (mm);Load (N)\n0;0\n1;--\n2;1\n3;2\n", {}, "line 3, column 2", "is no number"),
+        ("Ext (mm);Load (N)\n0;0\n1;--\n2;1\n3;2\n", {}, "line 3, column 2", "is not a number"),
         ("Ext (mm);Load (N)\n0;0\n1;\n2;1\n3;2\n", {}, "line 3, column 2", "empty above"),
-        ("Ext (mm);Load (N)\n0;0\nNaN;1\n2;1\n3;2\n", {}, "line 3, column 1", "is no number"),
-        ("Ext (mm);Load (N)\n0;0\n---;---\n2;1\n3;2\n", {}, "line 3, column 1", "is no number"),
+        ("Ext (mm);Load (N)\n0;0\nNaN;1\n2;1\n3;2\n", {}, "line 3, column 1", "is not a number"),
+        ("Ext (mm);Load (N)\n0;0\n---;---\n2;1\n3;2\n", {}, "line 3, column 1", "is not a number"),
         ("Ext (mm);Load (N)\n0;0\n1;1\n2;1\n3;\n", {}, "line 5, column 2", "not as many numbers"),
         ("Ext (mm);Load (N)\n0;0\n1;1;7\n2;1\n3;2\n", {}, "line 3", "must have 2 cells"),
         ("Ext (mm);Strain (%);Load (N)\n0;0;0\n1;1;1\n2;2;2\n", {}, "line 1", "several columns that could be the def"),
@@ -202,7 +202,7 @@ def test_what_is_wrong_is_named(text, told, place, message, tmp_path):
         ({"columns": {"force": 2}}, "columns: name no role"),
         ({"columns": {"load": 7}}, "columns: name no column"),
         ({"columns": {"load": "Kraft"}}, "columns: name no column"),
-        ({"units": {"load": "kp"}}, "is no unit"),
+        ({"units": {"load": "kp"}}, "is not a known unit"),
         ({"decimal": ";"}, "decimal"),
     ],
 )
@@ -213,7 +213,7 @@ def test_bad_arguments(told, message, tmp_path):
 
 
 def test_no_file():
-    with pytest.raises(RecordingError, match="is no file"):
+    with pytest.raises(RecordingError, match="is not a file"):
         textile.read_curves("nowhere.csv")
 
 

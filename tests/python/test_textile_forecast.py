@@ -147,7 +147,7 @@ def test_bad_options(change, message):
         ({"laws": []}, "laws: is empty"),
         ({"strain": [0.0, 0.1]}, "strain: must be positive"),
         ({"strain": [np.nan]}, "strain"),
-        ({"up_to": 0.5}, "up_to: is no strain"),
+        ({"up_to": 0.5}, "up_to: is not a strain"),
         ({"curves": [Curve("slack", "tension", [0.0, 0.01, 0.02], [0.0, 0.0, 5.0])]}, "bear nothing"),
         ({"curves": []}, "is empty"),
     ],

@@ -242,7 +242,8 @@ def test_a_wrong_frame_rate_looks_like_gravity_where_the_same_recording_drives()
     told, _ = told_numbers(problem, problem.parameters.initial())
     (size,) = (one for one in told if one.label == "size of gravity")
     said = words_of(size, 0.02, problem, [0])
-    assert said == "gravity were 2 % larger (times of the recording that are 1 % too short look alike: its frame rate)"
+    alike = "times of the recording that are 1 % too short have the same effect: its frame rate"
+    assert said == f"gravity were 2 % larger ({alike})"
     assert not any(one.label in ("frame rate", "recording delay") for one in told)  # both are the drive's too
 
 

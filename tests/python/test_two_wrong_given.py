@@ -22,7 +22,7 @@ from test_wrong_given import TIMES, asked
         ((0.0, 0.0, -9.7), "rope_length were 0.5 % more and gravity were 1.1 % larger"),
         (
             (-0.17, 0.0, -9.8085),
-            "rope_length were 0.49 % more and gravity were turned by 1 degrees toward x (a draft looks alike)",
+            "rope_length were 0.49 % more and gravity were turned by 1 degrees toward x (a draft has the same effect)",
         ),
     ],
 )

@@ -43,7 +43,7 @@ def test_a_model_that_rings_where_the_recording_rests_is_doubtful() -> None:
         profiles=False,
     )
     warp = found["cloth_warp"]
-    assert warp.verdict == "doubtful" and "else identified" in warp.words
+    assert warp.verdict == "doubtful" and "otherwise identified" in warp.words
     assert "that nothing moves would explain it better" in warp.words
     assert warp.half_width is not None and abs(warp.value - 60.0) > 2 * warp.half_width
 

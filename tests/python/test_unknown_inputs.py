@@ -98,8 +98,15 @@ def test_a_force_goes_beside_given_ones_with_other_knots() -> None:
     sum_of_both.add_force([6, 9], np.stack([at[0] + at[1], -at[0]], axis=1), knots)
     plain = sb.simulate(sum_of_both, TIMES, SOLVER).positions
     assert sb.simulate(scene, TIMES, SOLVER, values=values).positions == pytest.approx(plain, abs=1e-12)
-    with pytest.raises(sb.SceneError, match=r"add_force.times: differ from those of forces added before"):
-        hung().add_force([2], np.zeros(3))
+    later = hung(unknown=False)
+    sb.add_unknown_force(later, [6], **PUSH)
+    later.add_force([9], -wave[:, None], times)
+    later.add_force([4], [0.0, 0.0, 0.05])  # of any time
+    sum_of_both = hung(unknown=False)
+    loads = np.stack([at[1], -at[0], np.tile([0.0, 0.0, 0.05], (len(knots), 1))], axis=1)
+    sum_of_both.add_force([6, 9, 4], loads, knots)
+    plain = sb.simulate(sum_of_both, TIMES, SOLVER).positions
+    assert sb.simulate(later, TIMES, SOLVER, values=values).positions == pytest.approx(plain, abs=1e-12)
 
 
 def test_a_force_along_a_rope_and_on_a_body_is_spread_as_it_should_be() -> None:

@@ -211,7 +211,7 @@ def test_torch_differentiates_a_batch():
 
 def test_bad_input():
     rest = sb.equilibrium(chambers())
-    with pytest.raises(sb.SceneError, match=r"pressures_bar\.top.*is no volume.*above.*below"):
+    with pytest.raises(sb.SceneError, match=r"pressures_bar\.top.*is not a volume.*above.*below"):
         rest.gradient(pressures_bar={"top": 1.0})
     with pytest.raises(sb.SceneError, match=r"pressures_bar\.above"):
         rest.gradient(pressures_bar={"above": [1.0, 2.0]})

@@ -110,7 +110,7 @@ def test_the_axis_of_a_garment_that_points_up_is_told(folder: Path, up: str, gra
         (["panel.obj", "panel.obj"], "give one mesh"),
         (["panel.obj", "--units", "inch"], "--units"),
         (["large.obj"], "--units: is in doubt"),
-        (["none.obj"], "is no file"),
+        (["none.obj"], "is not a file"),
     ],
 )
 def test_what_is_wrong_with_a_garment_is_named(folder: Path, arguments: list[str], words: str) -> None:

@@ -55,7 +55,7 @@ def test_filtered_markers_are_named(smooth: Any, words: str) -> None:
     """6 Hz made bend damping 23 % too large, 1.1 half-widths in all, "identified" without a word."""
     found = sb.fit([fell(0, smooth)], parameters=tuple(TRUE)).result
     (named,) = [w for w in found.warnings if "the markers were" in w]
-    assert words in named and "Check that, and mend the model or the recording" in named
+    assert words in named and "Check that, and correct the model or the recording" in named
     off = abs(found["rope_bend_damping"].value - TRUE["rope_bend_damping"])
     assert found["rope_bend_damping"].verdict == "doubtful" or off < found["rope_bend_damping"].in_all
 
@@ -185,7 +185,7 @@ def test_where_nothing_explains_what_is_left_no_stiffness_is_identified() -> Non
     found = fitted_cloth(yield_shear=0.01, yield_shear_share=0.5)
     assert found.misfit.reduced_chi_square > 25.0
     assert [found[name].verdict for name in CLOTH] == ["doubtful"] * 4
-    assert [w for w in found.warnings if "nothing explains nearly all of that" in w]
+    assert [w for w in found.warnings if "no single error explains nearly all of that" in w]
 
 
 @pytest.mark.slow

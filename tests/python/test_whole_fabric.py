@@ -94,7 +94,7 @@ def test_one_command_finds_the_fabric(folder: Path, told: dict[str, object]) -> 
 def test_nothing_is_given_that_was_not_reached(folder: Path, told: dict[str, object]) -> None:
     report = (folder / "out" / "report.txt").read_text()
     (row,) = [line for line in report.splitlines() if line.split()[:2] == ["warp", "3"]]
-    assert row.endswith("not reached  not reached") and "nothing is carried on to it" in report
+    assert row.endswith("not reached  not reached") and "the law is not extrapolated to it" in report
     curves = textile.read_curves(folder / "warp1.csv", length=LENGTH, width=WIDTH)
     read = extensions(curves, 0, {"low": 10.0, "high": 98.07})
     assert read["high"] is None and 0.0 < read["low"] < 0.06
@@ -205,7 +205,7 @@ class TestOutlines:
         with pytest.raises(InputError, match="smaller than the plate or larger"):
             textile.read_outline(tmp_path / "d.csv", units="cm").coefficient(0.3, 0.18)
         (tmp_path / "bad.csv").write_text("x,y\n1,2\n3,four\n")
-        with pytest.raises(RecordingError, match="line 3: is no point"):
+        with pytest.raises(RecordingError, match="line 3: is not a point"):
             textile.read_outline(tmp_path / "bad.csv", units="m")
 
     @pytest.mark.parametrize("dark", [True, False])

@@ -153,7 +153,7 @@ def test_nothing_is_written_outside_the_folder(config: Path) -> None:
     assert "outside its folder" in refused(config, "simulate", config, "--output", "out")["problem"]
     Path("out/swing.npz").unlink()
     Path("out/swing.npz").symlink_to("swing.npz")  # to itself
-    assert refused(config, "simulate", config, "--output", "out")["problem"] == "is no path"
+    assert refused(config, "simulate", config, "--output", "out")["problem"] == "is not a path"
 
 
 def test_a_fit_does_not_write_over_its_inputs(config: Path) -> None:

@@ -94,7 +94,7 @@ def test_a_length_that_draws_off_a_stiffness_makes_it_doubtful() -> None:
     result = fitted(fall(rope(length=0.495)))
     EI = result["rope_EI"]
     assert EI.half_width is not None and abs(EI.value - TRUE["rope_EI"]) > 1.5 * EI.half_width
-    assert EI.verdict == "doubtful" and "is as if rope_length were 1 % more" in EI.words
+    assert EI.verdict == "doubtful" and "looks as if rope_length were 1 % more" in EI.words
     assert "With that it would be 0.001999 +/- 0.000054 N m^2" in EI.words
     assert wrong_and_identified(result) == []
     assert any("rope_length were 1 % more" in words for words in result.warnings)
@@ -186,10 +186,10 @@ def swinging(late: float) -> sb.Experiment:
 
 
 LACKING: dict[str, tuple[Any, str]] = {
-    "drag": (lambda: fall(rope(drag_linear=None)), "it had a drag_linear of 0.099 N s/m for every kg"),
+    "drag": (lambda: fall(rope(drag_linear=None)), "it had a drag_linear of 0.099 N s/m per kg"),
     "quadratic": (
         lambda: fall(rope(), drag_linear=None, drag_quadratic=5e-3),
-        "it had a drag_quadratic of 0.1 N s^2/m^2 for every kg",
+        "it had a drag_quadratic of 0.1 N s^2/m^2 per kg",
     ),
     "end": (lambda: heavier((8,), 3e-4), "0.29 g more hung on the end of rope"),
     "markers": (lambda: heavier(AT, 3e-4), "each marker weighed 0.28 g"),

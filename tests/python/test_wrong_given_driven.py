@@ -142,7 +142,7 @@ def test_a_hand_that_moves_farther_than_it_is_told_is_named() -> None:
 def test_a_hand_that_is_elsewhere_than_it_is_told_is_named() -> None:
     """Told 5 mm too far along x; nothing was named at residuals of 10 sigma."""
     (found,) = asked(carried_recording(carried(), carried(aside=5e-3)), names=("rope_EI", "rope_drag_linear"))
-    assert found.sure and any("what drives the scene was 5 mm farther along -x" in one for one in found.words)
+    assert found.sure and any("what drives the scene were 5 mm farther along -x" in one for one in found.words)
 
 
 def test_a_path_that_is_longer_changes_what_a_simulation_along_it_does() -> None:

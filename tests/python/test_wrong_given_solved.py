@@ -38,7 +38,7 @@ CASES: dict[str, tuple[Callable[[], sb.Scene], str]] = {
     "gravity": (lambda: rope((-0.1712, 0.0, -9.8085)), "gravity were turned by 1 degrees toward x"),
     "clamp": (
         lambda: rope(clamp_start=(1, 0, 0.0175)),
-        "the clamps and all with them were turned by 1 degrees about y",
+        "the clamps and everything attached to them were turned by 1 degrees about y",
     ),
 }
 

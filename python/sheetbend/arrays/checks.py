@@ -26,7 +26,7 @@ def numbers(field: str, values: ArrayLike, error: type[InputError], copy: bool =
     try:
         array = np.array(values) if copy else np.asarray(values)
         if array.dtype.kind not in "iufO":
-            raise TypeError(f"{array.dtype} is no type of real numbers")
+            raise TypeError(f"{array.dtype} is not a type of real numbers")
         return array.astype(float, copy=False)
     except (TypeError, ValueError, OverflowError, RuntimeError) as problem:
         raise error(field, "is not an array of numbers", type(values).__name__, "give numbers") from problem

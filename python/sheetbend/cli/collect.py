@@ -94,7 +94,7 @@ def _unmade(path: Path) -> dict[str, str]:
         if (folder / ERROR).is_file():
             found[folder.name] = (folder / ERROR).read_text(encoding="utf-8").rstrip()
         elif (folder / NAME).is_file() and not (folder / RESULT).is_file():
-            found[folder.name] = "the fit did not come to its end"
+            found[folder.name] = "the fit did not finish"
     return found
 
 

@@ -70,7 +70,7 @@ def fit_all(
             future.cancel()
     codes |= {folder.name: Code.INTERRUPTED for _, folder in left if folder.name not in codes}
     if Code.INTERRUPTED in codes.values():
-        console.print("\ninterrupted: the same command goes on from here", soft_wrap=True)
+        console.print("\ninterrupted: the same command continues from here", soft_wrap=True)
     failed = [name for name, code in codes.items() if code not in (Code.DONE, Code.INTERRUPTED)]
     if failed:
         console.print(f"\nnot done, not converged or not identifiable: {', '.join(failed)}", soft_wrap=True)

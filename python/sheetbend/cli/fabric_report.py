@@ -49,7 +49,7 @@ def _reached(study: FabricStudy) -> list[Section]:
     loads = ", ".join(f"{name} {short(load, 3)} N/m" for name, load in LOADS.items())
     notes = [("extensions under", loads)]
     if any("not reached" in row for row in rows):
-        notes.append(("not reached", "the pulls end below this load, and nothing is carried on to it"))
+        notes.append(("not reached", "the pulls end below this load, and the law is not extrapolated to it"))
     notes.append(
         ("the law holds", "up to the strains of this table; beyond them it is a guess (textile.forecast_pull)")
     )

@@ -45,7 +45,7 @@ from .progress import Iterations
 from .screen import heading, listing, show
 from .targets import check_targets
 
-STAYS = "the journal stays: the same command with --resume goes on from here"
+STAYS = "the journal stays: the same command with --resume continues from here"
 
 
 def fit(
@@ -262,7 +262,7 @@ def _study(config: Config, source: Path, start: Path | None) -> Study:
         )
     if start is not None:
         if not start.is_file():
-            raise ConfigError("--from", "is no file", str(start), "give the fit.json of an earlier fit")
+            raise ConfigError("--from", "is not a file", str(start), "give the fit.json of an earlier fit")
         config = with_values(config, FitResult.load(start).values)
     return build(config, source)
 
@@ -273,7 +273,7 @@ def _check_starts(config: Config, problem: FitProblem) -> None:
             if name not in problem.parameters.free:
                 raise ConfigError(
                     f"fit.starts[{i}].{name}",
-                    "is no free parameter",
+                    "is not a free parameter",
                     name,
                     f"use some of: {', '.join(problem.parameters.free)}",
                 )

@@ -48,7 +48,7 @@ def info(
 ) -> None:
     """Show what a recording or a configuration contains, or which versions are installed.
 
-    Of a recording: what it holds, its noise, and where each marker is first seen. Of a configuration: its scenes,
+    For a recording: what it holds, its noise, and where each marker is first seen. For a configuration: its scenes,
     quantities and parameters. Without a file: the versions, and what this build contains.
 
     Example: sheetbend info experiments/twin/data/twin.npz
@@ -117,7 +117,7 @@ def _recording(console: Console, recording: Recording) -> dict[str, Any]:
     doubt = unit_doubt(recording)
     if doubt is not None:
         said = (
-            f"the markers are {extent(recording):.4g} m apart: say units = {doubt} in a configuration, or in the JSON"
+            f"the markers are {extent(recording):.4g} m apart: write units = {doubt} in a configuration, or in the JSON"
         )
         console.print(said, soft_wrap=True)
     table = Table("marker", "first seen [s]", "x [m]", "y [m]", "z [m]", "lost", box=None, pad_edge=False)

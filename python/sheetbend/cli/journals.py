@@ -45,7 +45,7 @@ def journal_in(folder: Path, about: Mapping[str, str], resume: bool, say: Say) -
             raise ConfigError(
                 "--output", f"has a {NAME} that cannot be removed: {error.strerror}", str(path), fix
             ) from error
-        say(f"begins anew: an unfinished run in {folder} is given up ({OPTION} would have gone on with it)")
+        say(f"starts anew: the unfinished run in {folder} is discarded ({OPTION} would have continued it)")
     elif resume and not begun:
         say(f"nothing to resume in {folder}: the fit begins")
     try:
@@ -58,6 +58,6 @@ def journal_in(folder: Path, about: Mapping[str, str], resume: bool, say: Say) -
         yield None
         return
     if begun and resume:
-        say(f"goes on with {path}: {len(journal)} evaluations")
+        say(f"continues with {path}: {len(journal)} evaluations")
     with journal:
         yield journal

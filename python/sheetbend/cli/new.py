@@ -192,7 +192,7 @@ def _target(output: Path | None, name: str) -> Path:
     """The configuration to write, which is not there yet."""
     target = output if output is not None else Path(f"{name}.toml")
     if target.suffix.lower() != ".toml":
-        raise ConfigError("--output", "is no configuration", str(target), "give a file that ends in .toml")
+        raise ConfigError("--output", "is not a configuration", str(target), "give a file that ends in .toml")
     check_targets("--output", target.parent, [target])
     if target.exists():
         raise ConfigError("--output", "is there already", str(target), "name another file with --output")

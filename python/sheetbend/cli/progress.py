@@ -49,7 +49,7 @@ class Iterations:
         parts = [f"{name} {values[name]:.4g} {self.parameters[name].unit}".rstrip() for name in shown]
         more = len(self.parameters.free) - len(shown)
         line = Text.assemble(
-            "" if progress.window is None else (f"first {progress.window:g} s  ", "dim"),
+            "" if progress.window is None else (f"first {progress.window:.3g} s  ", "dim"),
             (_turn(progress), "bold"),
             f"  cost {progress.cost:.6g}  ",
             ("  ".join(parts), "cyan"),

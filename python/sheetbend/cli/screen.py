@@ -31,7 +31,7 @@ class Screen(Console):
             self.quiet = True
             silence(self.file)
             if not self.stderr:
-                Screen(stderr=True).print(f"stdout cannot be written: {error.strerror}; the command goes on without it")
+                Screen(stderr=True).print(f"stdout cannot be written: {error.strerror}; continuing without it")
 
     def on_broken_pipe(self) -> None:
         """Continue if nobody reads the output any more, as in `| head`, so that results are still written."""

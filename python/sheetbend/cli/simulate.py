@@ -94,7 +94,7 @@ def simulate(
         typer.Option(
             "--finer",
             help="Use a mesh that is twice as fine: twice the segments of ropes and twice the cells of cloths in each "
-            "direction. A fit with few segments predicts better so.",
+            "direction. This makes predictions of a fit with few segments more accurate.",
         ),
     ] = False,
     json: Json = False,

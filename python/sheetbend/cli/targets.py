@@ -46,7 +46,7 @@ def _resolved(option: str, path: Path) -> Path:
     try:
         return path.resolve()
     except (OSError, RuntimeError, ValueError) as error:  # a circle of links; a name that no file can have
-        raise ConfigError(option, "is no path", str(path), "give another one") from error
+        raise ConfigError(option, "is not a path", str(path), "give another one") from error
 
 
 def _identity(path: Path) -> tuple[int, int] | None:

@@ -117,5 +117,5 @@ def _scatter(values: Array) -> float:
 def _loss_in_words(curves: Sequence[Curve], cycle: int) -> str:
     lost = [part for part in (kes_numbers(c, cycle)[1] for c in curves) if part is not None]
     if not lost:
-        return "the curves have no way back, so what a loop would lose is not known"
-    return f"the specimens lose {100.0 * float(np.mean(lost)):.0f} % of the work of the way out"
+        return "the curves have no unloading, so the loss of a loop is not known"
+    return f"the specimens lose {100.0 * float(np.mean(lost)):.0f} % of the work of loading"

@@ -68,7 +68,7 @@ def _view(console: Console, file: Path, output: Path | None, units: str | None) 
         name, about = study.config.experiment.name, study.config.experiment.about
     page = output if output is not None else Path("out") / f"{name}{'_simulated' if simulated else ''}.html"
     if page.suffix.lower() not in (".html", ".htm"):
-        raise ConfigError("--output", "is no HTML file", str(page), "give a file that ends in .html")
+        raise ConfigError("--output", "is not an HTML file", str(page), "give a file that ends in .html")
     check_targets("--output", page.parent, [page])
     made("--output", page.parent)
     heading(console, name, "" if study is None else about)

@@ -63,7 +63,7 @@ def seats(
         for name, at in named.items():
             if name not in recording.markers:
                 fix = f"name some of: {', '.join(recording.markers)}"
-                raise ConfigError(f"{path}.markers.{name}", "is no marker of the recording", recording.name, fix)
+                raise ConfigError(f"{path}.markers.{name}", "is not a marker of the recording", recording.name, fix)
             with located(f"{path}.markers.{name}"):
                 given[name] = section.name, mesh.at([at])
         if section.grid is not None:

@@ -64,7 +64,7 @@ class ClothMesh(Section):
             raise ValueError(f"of kind '{self.kind}' has no {', '.join(foreign)}|{fix}")
         if self.margin is not None and not (len(self.margins) == 4 and min(self.margins) >= 0):
             raise ValueError(
-                "has a margin that is no length of each side|give one number, or four: left, right, lower, upper"
+                "has a margin that is not a length for each side|give one number, or four: left, right, lower, upper"
             )
         return self
 

@@ -206,7 +206,7 @@ def _along_warp(path: str, warp: list[float]) -> np.ndarray:
     x, y = warp[:2]
     size = np.hypot(x, y)
     if warp[2] != 0.0 or not size > 0:
-        raise ConfigError(path, "is no direction in the mesh's plane", warp, "give such as [1, 1, 0]")
+        raise ConfigError(path, "is not a direction in the mesh's plane", warp, "give such as [1, 1, 0]")
     return np.array([[x, -y], [y, x]]) / size
 
 

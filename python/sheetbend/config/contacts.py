@@ -133,7 +133,7 @@ def _points(path: str, contact: ContactSection, bodies: Sequence[BodySection]) -
     """The points of a body that touches: those given, or the corners of its box."""
     if not bodies:
         if contact.points is not None:
-            problem = "are given, and what touches is no body"
+            problem = "are given, and what touches is not a body"
             raise ConfigError(f"{path}.points", problem, contact.touching, "leave them out")
         return None
     if len(contact.touching) > 1:

@@ -63,7 +63,7 @@ def one(detail: Mapping[str, Any], model: type[BaseModel]) -> ConfigError:
         wanted = f"at least {limits['min_length']}" if kind == "too_short" else f"at most {limits['max_length']}"
         return ConfigError(field, f"has {limits['actual_length']} entries", got, f"give {wanted}")
     if kind == "literal_error":
-        return ConfigError(field, "is none of the choices", got, f"use {limits['expected']}")
+        return ConfigError(field, "is not one of the choices", got, f"use {limits['expected']}")
     if kind == "list_type" and isinstance(got, Mapping) and _holds_tables(path, model):
         header = _table(path)[1:-1]
         return ConfigError(field, "must be a list of tables", _short(got), f"write [[{header}]] in place of [{header}]")
@@ -163,7 +163,7 @@ def of_name(path: str, kind: str, name: str | None, known: Mapping[str, T], none
         ConfigError: nothing has this name.
     """
     if name is None or name not in known:
-        raise ConfigError(path, f"is no {kind}", name, f"name one of: {', '.join(known) or none}")
+        raise ConfigError(path, f"is not a {kind}", name, f"name one of: {', '.join(known) or none}")
     return known[name]
 
 
@@ -220,10 +220,10 @@ def _unknown(path: list[str | int], got: Any, model: type[BaseModel]) -> ConfigE
     name, keys = str(path[-1]), f"The keys of {_table(path[:-1])} are: "
     other = _elsewhere(path, got, known, model) or meant(name, known)
     if other is not None:
-        return ConfigError(dotted(path), "is no known key", name, f"{other} {keys}{', '.join(known)}")
+        return ConfigError(dotted(path), "is not a known key", name, f"{other} {keys}{', '.join(known)}")
     near = difflib.get_close_matches(name, known, n=1, cutoff=0.6) or [k for k in known if k.lower() == name.lower()]
     fix = f"did you mean '{near[0]}'? {keys}{', '.join(known)}" if near else f"use some of: {', '.join(known)}"
-    return ConfigError(dotted(path), "is no known key", name, fix)
+    return ConfigError(dotted(path), "is not a known key", name, fix)
 
 
 def _elsewhere(path: list[str | int], got: Any, known: Sequence[str], model: type[BaseModel]) -> str | None:

@@ -80,7 +80,7 @@ def content(path: Path) -> dict[str, Any]:
     try:
         text = bounded_bytes(path, LARGEST, ConfigError).decode("utf-8")
     except UnicodeDecodeError as error:
-        raise ConfigError(str(path), "is no UTF-8 text", path.name, "save it as UTF-8") from error
+        raise ConfigError(str(path), "is not UTF-8 text", path.name, "save it as UTF-8") from error
     if _MANY_PARTS.search(text):  # which the parser takes time for that grows as their square
         fix = "write tables, as docs/configuration.md shows them"
         raise ConfigError(str(path), "holds a key of very many parts", path.name, fix)
@@ -90,7 +90,7 @@ def content(path: Path) -> dict[str, Any]:
         raise
     except ValueError as error:  # tomllib's own is one, and so is that of a number of too many digits
         line = _line_of(text, str(error))
-        raise ConfigError(str(path), f"is no valid TOML: {error}", line or path.name, _mended(line)) from error
+        raise ConfigError(str(path), f"is not valid TOML: {error}", line or path.name, _mended(line)) from error
     check_depth(path, found, ConfigError)
     _check_texts(found)
     return found

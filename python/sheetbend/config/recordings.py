@@ -109,7 +109,7 @@ def check_names_used(path: str, section: RecordingSection, experiment: Experimen
     for marker in section.offsets:
         if marker not in experiment.recording.markers:
             fix = f"name some of: {', '.join(experiment.recording.markers)}"
-            raise ConfigError(f"{path}.offsets.{marker}", "is no marker of the recording", marker, fix)
+            raise ConfigError(f"{path}.offsets.{marker}", "is not a marker of the recording", marker, fix)
     if section.time_offset is not None and section.time_offset not in experiment.scene.quantities:
         fix = f'declare [scene.quantities.{section.time_offset}] with unit = "s"'
         raise ConfigError(f"{path}.time_offset", "names no quantity", section.time_offset, fix)

@@ -170,4 +170,4 @@ def check_markers(path: str, section: schema.Rope | schema.Rod, names: tuple[str
     for marker in section.markers or {}:
         if marker not in names:
             fix = f"name some of: {', '.join(names)}"
-            raise ConfigError(f"{path}.markers.{marker}", "is no marker of the recording", marker, fix)
+            raise ConfigError(f"{path}.markers.{marker}", "is not a marker of the recording", marker, fix)

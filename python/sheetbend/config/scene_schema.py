@@ -103,8 +103,7 @@ class PointMass(Section):
 
 
 class Force(Section):
-    """A force over time on particles, or on a point of a body. A list: [[scene.force]]; all of one scene share their
-    times."""
+    """A force over time on particles, or on a point of a body. A list: [[scene.force]]."""
 
     name: Name | None = key(None, "adds the quantities <name>_x, <name>_y, <name>_z (N); a plain force when left out")
     particles: list[Reference] = key([], "each of them bears the whole force")

@@ -73,5 +73,5 @@ def _mesh(path: str, section: SolidSection, folder: Path, finer: int) -> SolidMe
 
 def _members(path: str, mesh: SolidMesh, name: str) -> np.ndarray:
     if name not in mesh.sets:
-        raise ConfigError(path, "is no set of the solid", name, f"use one of: {', '.join(mesh.sets) or 'none'}")
+        raise ConfigError(path, "is not a set of the solid", name, f"use one of: {', '.join(mesh.sets) or 'none'}")
     return mesh.sets[name]

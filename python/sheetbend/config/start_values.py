@@ -25,7 +25,7 @@ def check_names(config: schema.Config, experiments: tuple[Experiment, ...]) -> N
             base = name.partition("[")[0]
             if base not in known:
                 fix = _left_out(config, base) or choices(base, known)
-                raise ConfigError(f"{section}.{name}", "is no quantity of the scenes", name, fix)
+                raise ConfigError(f"{section}.{name}", "is not a quantity of the scenes", name, fix)
 
 
 def _left_out(config: schema.Config, name: str) -> str | None:
@@ -48,7 +48,7 @@ def set_start_values(scene: Scene, config: schema.Config, values: Mapping[str, f
     for name, value in values.items():
         if name not in scene.quantities:
             fix = _left_out(config, name) or choices(name, scene.quantities)
-            raise ConfigError(f"{path}.values.{name}", "is no quantity of the scene", name, fix)
+            raise ConfigError(f"{path}.values.{name}", "is not a quantity of the scene", name, fix)
         p = config.parameters.get(name)
         if p is not None and not p.private:
             fix = f"set parameters.{name}.initial, or make it private = true"

@@ -297,5 +297,5 @@ def _words(problem: FitProblem, u: Array, column: int, b: Beginning, step: float
     alone, before = (short(math.sqrt(2 * cost / rows), 2) for cost in (b.cost, b.before))
     return (
         f"the first {short(b.length)} s alone ask for {asked}, and leave residuals of {alone} sigma where the values "
-        f"of the whole leave {before}; the model lacks something, such as a loss, or this is not its lowest minimum"
+        f"of the whole leave {before}; the model lacks something, such as a loss, or this is not the lowest minimum"
     )

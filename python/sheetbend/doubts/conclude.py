@@ -184,9 +184,7 @@ def warnings_of(
     warnings, best = [], ends[0]
     for verdict in UNSOUND:
         if names := [e.name for e in estimates if e.verdict == verdict]:
-            also = (
-                "" if len(names) == len(estimates) else "; what is wrong with one number may have drawn off the others"
-            )
+            also = "" if len(names) == len(estimates) else "; an error in one value may have shifted the others"
             warnings.append(f"{verdict}: {', '.join(names)} (see what contradicts this fit){also}")
     for e in estimates:
         if ran_off(problem.parameters[e.name], e.value):
@@ -195,9 +193,9 @@ def warnings_of(
             warnings.append(f"{e.name} ran off from {where}, and the others were fitted with it there")
     warnings += [f"{e.name}: {words}" for e in problem.experiments for words in e.recording.mends]
     if best.cost == 0.0:
-        warnings.append("the residuals are exactly zero: intervals have no width, and nothing tells how wrong they are")
+        warnings.append("the residuals are exactly zero, so the intervals have no width and say nothing about errors")
     if best.converged and best.doubt:
-        warnings.append(f"the fit ended where {best.doubt}; intervals take the cost as smooth")
+        warnings.append(f"the fit ended where {best.doubt}; the intervals assume a smooth cost")
     if interrupted:
         warnings.append(
             "interrupted: intervals are the linear ones, without profiles and without refits on a finer discretization"
@@ -205,10 +203,10 @@ def warnings_of(
         )
     elsewhere = [m for m in ends if best.cost * (1.0 + INACCURATE) < m.cost < np.inf]
     if elsewhere:
-        warnings.append(f"{len(elsewhere)} of {len(ends)} starts ended in a worse minimum: the cost has several")
+        warnings.append(f"{len(elsewhere)} of {len(ends)} starts ended in a worse minimum: the cost has several minima")
     without = [m for m in ends if m.cost == np.inf]
     if without:
-        warnings.append(f"{len(without)} of {len(ends)} starts led nowhere: {without[0].message}")
+        warnings.append(f"{len(without)} of {len(ends)} starts failed: {without[0].message}")
     if not best.converged and not best.interrupted:
         warnings.append(f"the fit did not converge: {best.message.rstrip('.')}" + (f"; {ahead}" if ahead else ""))
     return tuple(warnings)

@@ -52,7 +52,7 @@ def doubtful(
     """
     of_all = of_all or {}
     return tuple(
-        replace(e, verdict="doubtful", words=f"{doubts[e.name]} (else {e.verdict}, {e.words})")
+        replace(e, verdict="doubtful", words=f"{doubts[e.name]} (otherwise {e.verdict}, {e.words})")
         if e.name in doubts and (e.verdict in CLAIMS or (e.name in of_all and e.verdict == DENIES))
         else e
         for e in estimates
@@ -146,7 +146,7 @@ def drawn_along(judged: Identifiability, words: Mapping[str, str]) -> dict[str, 
     for pair in sorted(judged.correlations, key=lambda pair: -abs(pair.value)):
         for one, other in ((pair.first, pair.second), (pair.second, pair.first)):
             if abs(pair.value) >= TRADES and other in words and one not in words:
-                why = f"trades with {other} (correlation {pair.value:+.2f}), about which parts of the data disagree"
+                why = f"is correlated with {other} ({pair.value:+.2f}), about which parts of the data disagree"
                 along.setdefault(one, why)
     return {**along, **words}
 
@@ -178,14 +178,14 @@ def _lack(problem: FitProblem) -> str:
     """What contradicting parts mean; where states at borders of windows could be freed, pushes are named, which move a
     real motion off its model a little at every instant."""
     windows = any(not e.static and e.shooting is None and start_quantities(e.scene) for e in problem.experiments)
-    such = ", such as small pushes along the motion, which `shooting` counts" if windows else ""
-    return f"the model lacks something{such}, or this is not its lowest minimum"
+    such = ", such as small pushes along the motion (`shooting` allows for them)" if windows else ""
+    return f"the model lacks something{such}, or this is not the lowest minimum"
 
 
 def _difference_words(p: Parameter, at: float, found: Difference, lack: str) -> str:
     said = [value_words(p, at, step, reach) for step, reach in zip(found.steps, found.reaches, strict=True)]
     return (
-        f"parts of the data contradict each other: {found.name} asks for {said[0]}, the rest for {said[1]} (to first "
+        f"parts of the data contradict each other: {said[0]} from {found.name}, {said[1]} from the rest (to first "
         f"order); {lack}"
     )
 
@@ -346,6 +346,6 @@ def held_out_motion(
         if row.motion is None or row.held_out is None or not row.held_out > max(row.motion, SEEN * noise):
             continue
         error = f"{short(100 * row.held_out / row.motion)} % of the motion"
-        words = f"held-out motion of {row.name} is missed by {error}: that nothing moves would predict it better"
+        words = f"the error on the held-out motion of {row.name} is {error}: that nothing moves is a better prediction"
         found |= {name: words for name in problem.acting_on(c.experiment) if name not in found}
     return found

@@ -120,8 +120,8 @@ def _doubted(problem: FitProblem, worst: DrivenNoise, off: dict[str, float], of:
         if abs(x) > OFF * reach_of(p, estimate):
             size = f"{short(100 * abs(np.expm1(x)), 2)} %" if p.log else f"{short(abs(x), 2)} {p.unit}".rstrip()
             named[estimate.name] = (
-                f"noise of the {_what(worst)} of {worst.experiment} ({short(1e3 * worst.noise, 2)} mm) draws the fit "
-                f"off: this one by some {size} too {'high' if x > 0 else 'low'}, to first order. Fix: {_fix(worst)}"
+                f"noise of the {_what(worst)} of {worst.experiment} ({short(1e3 * worst.noise, 2)} mm) biases the fit: "
+                f"this value is some {size} too {'high' if x > 0 else 'low'}, to first order. Fix: {_fix(worst)}"
             )
     return named
 
@@ -140,10 +140,8 @@ def _fix(one: DrivenNoise) -> str:
 
 def _moved_words(one: DrivenNoise) -> str:
     if one.sensor:
-        return f"what {one.sensor} reads by {short(one.moved, 2)} N, beside a residual of {short(one.residual, 2)} N"
-    return (
-        f"the compared ones by {short(1e3 * one.moved, 2)} mm, beside a residual of {short(1e3 * one.residual, 2)} mm"
-    )
+        return f"what {one.sensor} reads by {short(one.moved, 2)} N; the residual is {short(one.residual, 2)} N"
+    return f"the compared ones by {short(1e3 * one.moved, 2)} mm; the residual is {short(1e3 * one.residual, 2)} mm"
 
 
 def _corrected(problem: FitProblem, u: Array) -> list[str]:

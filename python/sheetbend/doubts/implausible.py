@@ -57,4 +57,4 @@ def _of(known: Mapping[str, float], scene: Scene) -> Iterator[str]:
             yield f"{name}_density of {short(density)} kg/m^2 is less than any fabric's. Is it in another unit?"
     gravity = math.hypot(*scene.gravity)
     if gravity > HEAVIEST_GRAVITY:
-        yield f"gravity of {short(gravity)} m/s^2 is no planet's. Is it in another unit?"
+        yield f"gravity of {short(gravity)} m/s^2 is not that of any planet. Is it in another unit?"

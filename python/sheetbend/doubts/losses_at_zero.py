@@ -51,7 +51,7 @@ def losses_at_zero(e: Experiment, inputs: Mapping[str, Array], free: np.ndarray)
         if not inputs[array].any():
 
             def says(size: float, array: str = array, unit: str = unit) -> str:
-                return f"it had a {array} of {short(size, 2)} {unit} for every kg, which the model lacks"
+                return f"it had a {array} of {short(size, 2)} {unit} per kg, which the model lacks"
 
             yield array, (array, free, mass[free]), says
     every = list(places_of_groups(e.scene.groups))

@@ -79,11 +79,11 @@ def missing_force(problem: FitProblem, u: Array, judged: Identifiability) -> dic
         p, e = problem.parameters[name], estimates[name]
         if e.verdict in UNSOUND or (there is not None and abs(there[0]) + there[1] <= WIDER * reach_of(p, e)):
             continue
-        be = "could not be told from them" if there is None else f"would be {value_words(p, u[column], *there)}"
+        be = "could not be determined" if there is None else f"would be {value_words(p, u[column], *there)}"
         words[name] = (
-            f"rests on there being no other force: accelerations, one in each recording ({short(found.size, 2)} m/s^2 "
-            f"in the median), would explain {part}, and with them it {be} (to first order). The model lacks a force, "
-            "such as that of moving air, or recordings drift or lean"
+            f"assumes that no other force acts. An unknown acceleration in each recording ({short(found.size, 2)} "
+            f"m/s^2 in the median) would explain {part}, and with it the value {be} (to first order). The model lacks "
+            "a force, such as that of moving air, or recordings drift or lean"
         )
     return words
 

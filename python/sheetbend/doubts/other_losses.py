@@ -263,7 +263,7 @@ def _lacks_damping(only: str) -> Says:
 
 def _lacks_yield(problem: FitProblem, name: str) -> Callable[[Array], Says]:
     held = held_stiffness(problem, name)
-    given = f"Fit {', '.join(held)} first: a given value that is too large looks alike. If the friction stays, give"
+    given = f"Fit {', '.join(held)} first: too large a given value has the same effect. If the friction stays, give"
     first = given if held else "Give"
     return lambda _: (
         lambda names, less: (

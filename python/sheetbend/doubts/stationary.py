@@ -130,5 +130,5 @@ def _lower_nearby(problem: FitProblem, end: Minimum) -> str:
                 if cost < end.cost * (1 - FAR):
                     less = 100 * (1 - cost / end.cost)
                     value = f"{short(parameter.to_physical(there))} {parameter.unit}".rstrip()
-                    return f"it hardly moved, though {name} = {value} alone takes {short(less, 2)} % off the cost"
+                    return f"it hardly moved, although {name} = {value} alone lowers the cost by {short(less, 2)} %"
     return ""

@@ -55,7 +55,7 @@ def bounded_by_sticking(problem: FitProblem, u: Array, judged: Identifiability, 
 def _bounded(e: Estimate, problem: FitProblem, profiles: Profiles, rise: float) -> Estimate:
     parameter = problem.parameters[e.name]
     if e.verdict == "one-sided":  # as its profile found
-        return replace(e, words=f"{e.words}, for all that touches sticks") if e.upper is None else e
+        return replace(e, words=f"{e.words}, because all contacts stick") if e.upper is None else e
     side = 1.0 if e.statistical is not None else -1.0
     if e.statistical is not None and (
         profiles(e.name, e.value + e.statistical) > profiles(e.name, e.value) + LEVEL * rise
@@ -79,5 +79,5 @@ def _bounded(e: Estimate, problem: FitProblem, profiles: Profiles, rise: float) 
         return replace(e, verdict="no minimum", words=words)
     if bound is None or not np.isfinite(bound) or ends[1] is not None:
         return e
-    words = f"{side_words(parameter, bound, None)}, for all that touches sticks"
+    words = f"{side_words(parameter, bound, None)}, because all contacts stick"
     return replace(e, lower=bound, upper=None, half_width=None, statistical=None, verdict="one-sided", words=words)

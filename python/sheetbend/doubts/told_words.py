@@ -23,7 +23,7 @@ def words_of(one: Told, more: float, problem: FitProblem, group: Sequence[int]) 
         alike = ""
         if e.scene.boundary.following:  # its frame rate moves all that is measured, and has no direction of its own
             rate = f"{short(abs(50 * more), 2)} % too {'short' if more > 0 else 'long'}"
-            alike = f" (times of the recording that are {rate} look alike: its frame rate)"
+            alike = f" (times of the recording that are {rate} have the same effect: its frame rate)"
         return f"gravity were {size} {'larger' if more > 0 else 'smaller'}{alike}"
     if one.label == LATER and e.scene.boundary.driven:
         when = f"{short(1e3 * abs(more), 2)} ms {'early' if more > 0 else 'late'}"
@@ -44,19 +44,21 @@ def words_of(one: Told, more: float, problem: FitProblem, group: Sequence[int]) 
     if one.label == LARGER:
         return f"the recording{of} were {size} too {'small' if more < 0 else 'large'} (its scale)"
     if one.name == "gravity":
-        alike = " (a draft looks alike)" if e.scene.has_drag else ""
+        alike = " (a draft has the same effect)" if e.scene.has_drag else ""
         return f"gravity were turned by {short(abs(more) / DEGREE, 2)} degrees {_way(one.label, more)}{alike}"
     if one.label.startswith(DRAFT):
         return f"the air moved at {short(abs(more), 2)} m/s along {axis}"
     if one.name == "clamp_direction":
-        return f"the clamps{of} and all with them were turned by {short(abs(more) / DEGREE, 2)} degrees about {axis}"
+        turned = f"turned by {short(abs(more) / DEGREE, 2)} degrees about {axis}"
+        return f"the clamps{of} and everything attached to them were {turned}"
     if one.label.startswith(ASIDE):
-        return f"what drives the scene{of} was {short(abs(more) / MILLIMETER, 2)} mm farther along {axis}"
+        return f"what drives the scene{of} were {short(abs(more) / MILLIMETER, 2)} mm farther along {axis}"
     if one.label.startswith(BESIDE):
         off = short(abs(more) / MILLIMETER, 2)
         return f"all markers{of} stood {off} mm off the axis of the rope, at right angles to it and to {axis}"
     if one.name == "clamps":
-        return f"the clamps{of} and all with them stood {short(abs(more) / MILLIMETER, 2)} mm farther along {axis}"
+        farther = f"{short(abs(more) / MILLIMETER, 2)} mm farther along {axis}"
+        return f"the clamps{of} and everything attached to them stood {farther}"
     if one.name == "markers":
         who = f"marker {one.marker}" if one.marker else "all markers"
         along = f"axis {1 + int(one.label.rsplit(' ', 1)[-1])} of the cloth" if e.scene.cloths else "the material"

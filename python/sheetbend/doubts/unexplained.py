@@ -138,7 +138,7 @@ def _words(c: Comparison, alike: float, values: Values) -> str:
         beside = " beside that of its grips" if s.carried else ""
         return (
             f"the fit leaves {missed} % of the variance over time of the motion of {name}{beside}, so it does not "
-            "explain that motion; the model lacks something, such as a loss, or this is not its lowest minimum"
+            "explain that motion; the model lacks something, such as a loss, or this is not the lowest minimum"
         )
     return ""
 

@@ -282,9 +282,7 @@ def doubts_of(problem: FitProblem, u: Array, judged: Identifiability, wrong: Seq
                 moved[name] = f"{cause}. {which} it would be {there} ({order})"
         if moved and not one.sure and one.times > FAR:
             others = {name for i in one.motions for name in problem.acting_on(problem.experiments[i])} - set(moved)
-            why = (
-                f"{_unsure(problem, one)}. That makes {', '.join(moved)} doubtful, and what it moves here is not known"
-            )
+            why = f"{_unsure(problem, one)}. That makes {', '.join(moved)} doubtful, and its effect here is not known"
             moved |= {name: why for name in problem.parameters.free if name in others}
         found |= {name: why for name, why in moved.items() if estimates[name].verdict not in UNSOUND}
     return found
@@ -293,7 +291,7 @@ def doubts_of(problem: FitProblem, u: Array, judged: Identifiability, wrong: Seq
 def warnings_of(problem: FitProblem, wrong: Sequence[Wrong]) -> tuple[str, ...]:
     """The wrong numbers that explain nearly all, and where very much is left those that explain a part of it."""
     told = [(_sentence if one.sure else _unsure)(problem, one) for one in wrong if one.sure or one.times > FAR]
-    return tuple(f"{words}. Check that, and mend the model or the recording" for words in told)
+    return tuple(f"{words}. Check that, and correct the model or the recording" for words in told)
 
 
 def explained_by(problem: FitProblem, wrong: Sequence[Wrong]) -> dict[str, float]:
@@ -315,8 +313,8 @@ def _whose(problem: FitProblem, wrong: Wrong) -> str:
 def _unsure(problem: FitProblem, wrong: Wrong) -> str:
     part, size = short(100 * wrong.explained, 2), short(math.sqrt(1.0 + wrong.times), 2)
     return (
-        f"residuals are {size} times the noise of {_whose(problem, wrong)}, and nothing explains nearly all of that. "
-        f"{part} % of it is as if {', or '.join(wrong.words)}"
+        f"residuals are {size} times the noise of {_whose(problem, wrong)}, and no single error explains nearly all of "
+        f"that. {part} % of it looks as if {', or '.join(wrong.words)}"
     )
 
 
@@ -325,4 +323,4 @@ def _sentence(problem: FitProblem, wrong: Wrong) -> str:
     part = short(100 * min(wrong.explained, 1.0), 2)
     noise = "noise, that of what drives it included," if wrong.driven else "noise"
     fit = "a fit without `shooting`" if wrong.unbroken else "the fit"
-    return f"{part} % of what {fit} leaves of {whose} beyond {noise} is as if {', or '.join(wrong.words)}"
+    return f"{part} % of what {fit} leaves of {whose} beyond {noise} looks as if {', or '.join(wrong.words)}"

@@ -95,7 +95,9 @@ class Experiment:
 
     def __post_init__(self) -> None:
         if not isinstance(self.recording, Recording):
-            raise InputError("recording", "is no Recording", self.recording, "read the file: sb.Recording.load(path)")
+            raise InputError(
+                "recording", "is not a Recording", self.recording, "read the file: sb.Recording.load(path)"
+            )
         check_scene(self.scene)
         object.__setattr__(self, "solver", Solver.given(self.solver))
         if not self.name:

@@ -38,7 +38,7 @@ def simulate_forces(
     """Simulate a scene from its start, and read the force and torque at one of its supports.
 
     Args:
-        scene: is frozen by this.
+        scene: frozen by this call.
         times: (samples,) s, increasing, after 0; at the end of the first substep there is a force.
         at: the support, see `ForceSensor.at`.
         solver: `Solver()` by default.

@@ -87,7 +87,7 @@ class ForceSensor:
     def __post_init__(self) -> None:
         if not isinstance(self.recording, ForceRecording):
             fix = "read the file: sb.ForceRecording.load(path)"
-            raise InputError("force.recording", "is no ForceRecording", self.recording, fix)
+            raise InputError("force.recording", "is not a ForceRecording", self.recording, fix)
         if not self.name:
             object.__setattr__(self, "name", self.recording.name)
         for key, value in (("sigma", self.sigma), ("torque_sigma", self.torque_sigma)):

@@ -58,7 +58,7 @@ def check_file(path: Path, error: type[InputError] = RecordingError, wanted: str
     beside = [file.name for file in path.parent.iterdir()] if path.parent.is_dir() else []
     near = [] if path.is_dir() else difflib.get_close_matches(path.name, beside, n=1)
     fix = f"did you mean {path.with_name(near[0])}?" if near else f"give {wanted}; relative paths start at {Path.cwd()}"
-    raise error(str(path), "is a folder" if path.is_dir() else "is no file", str(path), fix)
+    raise error(str(path), "is a folder" if path.is_dir() else "is not a file", str(path), fix)
 
 
 @contextmanager
@@ -119,7 +119,7 @@ def _reason_and_fix(problem: Exception) -> tuple[str, str]:
     if isinstance(problem, RecursionError):
         return "is nested too deeply", "write it without so many brackets"
     if isinstance(problem, UnicodeError):
-        return "is no text in the encoding that it should have", "save it as UTF-8"
+        return "is not text in the encoding that it should have", "save it as UTF-8"
     if isinstance(problem, OSError):
         return f"cannot be read: {problem.strerror or problem}", "check that it is there and may be read"
     return (

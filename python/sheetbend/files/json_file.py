@@ -55,4 +55,4 @@ def check_depth(path: Path, content: Any, error: type[InputError]) -> None:
 
 
 def _refuse(constant: str) -> NoReturn:
-    raise ValueError(f"{constant} is no number of JSON")
+    raise ValueError(f"{constant} is not a JSON number")

@@ -29,7 +29,7 @@ def in_bytes(field: str, amount: object) -> int:
         size = float(amount) if amount < MOST else math.inf
     if not (math.isfinite(size) and size >= 1.0):
         fix = f'give bytes, or a text such as "2 GB"; units are {", ".join(UNITS)}'
-        raise InputError(field, "is no amount of memory", amount, fix)
+        raise InputError(field, "is not an amount of memory", amount, fix)
     return int(size)
 
 

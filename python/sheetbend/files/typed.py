@@ -30,7 +30,7 @@ def as_dataclass(kind: type[T], data: object, where: str) -> T:
     for name in given:
         if name not in fields:
             fix = f"leave it out; there are: {', '.join(fields)}"
-            raise InputError(_joined(where, name), "is no field that this version knows", name, fix)
+            raise InputError(_joined(where, name), "is not a field that this version knows", name, fix)
     for name, field in fields.items():
         needed = field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
         if needed and name not in given:

@@ -49,7 +49,7 @@ def listed(experiments: Iterable[Experiment]) -> list[Experiment]:
     found = list(experiments) if is_several(experiments) else []
     if not is_several(experiments) or not all(isinstance(e, Experiment) for e in found):
         fix = "give a scene with its recording, an sb.Experiment, or a list of them"
-        raise InputError("experiments", "hold what is no Experiment", experiments, fix)
+        raise InputError("experiments", "hold what is not an Experiment", experiments, fix)
     return found
 
 

@@ -123,6 +123,14 @@ def fit(
 ) -> Fit:
     """Fit quantities of scenes to recordings.
 
+    Examples:
+        >>> recording = sb.Recording.load("experiments/twin/data/twin.npz")
+        >>> rope = sb.rope(0.6, 20, density=0.05, EI=1e-3, bend_damping=0.01, drag_linear=0.02, clamp_start=(1, 0, 0))
+        >>> fit = sb.fit(rope, recording, ["rope_EI"], solver=sb.Solver(h=1 / 480), refine=False, profiles=False)
+        >>> EI = fit["rope_EI"]  # an Estimate: EI.value, EI.lower, EI.upper, EI.unit, EI.verdict
+        >>> print(f"{EI.value:.1e} {EI.unit}")
+        2.0e-03 N m^2
+
     Args:
         scene: a scene with its `recording` (and any field of `Experiment` as keyword), or one or several experiments.
         parameters: what to fit: names of quantities, `Parameter`s, or a mapping from name to fields of `Parameter`.

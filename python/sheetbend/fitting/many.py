@@ -77,7 +77,7 @@ def fit_many(
     """
     check_count("max_iterations", max_iterations, 1, MOST_WHOLE, InputError)
     if progress is not None and not callable(progress):
-        raise InputError("progress", "is no function", progress, "give one, or leave it out")
+        raise InputError("progress", "is not a function", progress, "give one, or leave it out")
     every = within(listed(experiments))
     if len(every) < FEWEST:
         raise InputError("experiments", "are few", len(every), f"give at least {FEWEST}, or use sheetbend.fit")

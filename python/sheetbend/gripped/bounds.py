@@ -74,11 +74,14 @@ def _limits(model: RopeModel, motions: Sequence[GrippedMotion], window: float) -
 SLIDES = "the windows show EI times damping at best, and neither EI nor the damping is to be trusted"
 TURNS = "a fit beyond a turn explains something else by built-in twist; GJ and the roll are not to be trusted"
 WORDS: Mapping[str, tuple[str, str]] = {
-    "EI": ("the rope hangs as a chain would, and EI is not to be trusted", "the rope hardly bends, and EI is open"),
-    "GJ": ("no torsional stiffness is seen", "the rope hardly twists, and GJ is open"),
+    "EI": (
+        "the rope hangs as a chain would, and EI is not to be trusted",
+        "the rope hardly bends, and EI is unknown",
+    ),
+    "GJ": ("no torsional stiffness is seen", "the rope hardly twists, and GJ is unknown"),
     "bend_damping": ("no internal damping is seen, or the substep damps as much", SLIDES),
     "drag_linear": ("no drag is seen", "the rope hardly moves against the air, and drag is not to be trusted"),
     "roll": (TURNS, TURNS),
-    "yield_share": ("hardly anything slides", "nearly all of the bending stiffness slides, and EI is open"),
+    "yield_share": ("hardly anything slides", "nearly all of the bending stiffness slides, and EI is unknown"),
 }
 """What an end at the lower and at the upper bound says."""

@@ -115,7 +115,7 @@ class Climb:
         given, split = search.given, search.split
         by = lateness(rope.model, split.fitted, rope.values, search.threads)
         if by is None or abs(by) < (LEFT if self.late else LEAST):
-            why = "no delay is found" if by is None else f"a delay of {1e3 * by:.2g} ms is too small to be told"
+            why = "no delay is found" if by is None else f"a delay of {1e3 * by:.2g} ms is too small to be detected"
             return self._skip(rung, verdict(rope.errors, rope.errors), began, why)
         found: Rope | None = None
         told: Verdict | None = None
@@ -235,8 +235,8 @@ class Climb:
         fitted, others = self.rope.errors.typical
         seconds = time.perf_counter() - began
         self.steps.append(Step(rung.name, fitted, others, False, seconds, told.ratio, told.better, told.count))
-        why = why or f"one step promises {told.ratio:.3g} times the errors without it"
-        self.search.say(f"{rung.name}: {why}, does not stay")
+        why = why or f"one step predicts {told.ratio:.3g} times the errors without it"
+        self.search.say(f"{rung.name}: {why}, is not kept")
         return False
 
     def _with(self, rung: Rung, rope: Rope) -> tuple[RopeModel, Parts]:
@@ -275,12 +275,12 @@ class Climb:
 
     def _tell(self, step: Step) -> None:
         if not np.isfinite(step.others):
-            self.search.say(f"{step.name}: diverges, does not stay")
+            self.search.say(f"{step.name}: diverges, is not kept")
             return
         errors = f"{1e3 * step.fitted:.3g} mm, {1e3 * step.others:.3g} mm on others"
         if step.ratio is not None:
             errors += f", {step.ratio:.3g} times without it, better on {step.better} of {step.count}"
-        self.search.say(f"{step.name}: {errors}{'' if step.stays else ', does not stay'}")
+        self.search.say(f"{step.name}: {errors}{'' if step.stays else ', is not kept'}")
 
     def _tried(self, rung: Rung, rope: Rope) -> Rope | None:
         """A rope with a rung, fitted to middle windows from each of the rung's starts, and the best of these to long

@@ -56,7 +56,7 @@ def conclude(
     assert rope is not None
     experiments = experiments_of(rope.model, motions, window, rope.values)
     parameters = bounded(rope.parameters, rope.model, motions, window[0])
-    say(f"the fit that counts, to {counted(motions, window)}")
+    say(f"the last fit, to {counted(motions, window)}")
     if len(experiments) > MANY:
         say(f"which takes about {short(_seconds(rope, motions, window, threads), 1)} s")
     values, spread = rope.values, dict[str, float]()
@@ -69,7 +69,7 @@ def conclude(
             values = _at_the_end(climb, values, experiments, parameters, sure=False)  # `fit` goes on from there
         except KeyboardInterrupt:
             interrupted = True
-            say("interrupted: the fit that counts did not get to its end")
+            say("interrupted: the last fit did not get to its end")
 
     def finer() -> list[Experiment]:
         model = replace(rope.model, segments=2 * rope.model.segments)
@@ -119,7 +119,7 @@ def _at_the_end(
     """
     found = descend(problem_of(experiments, parameters, values, climb.search.threads), MOST, sure=sure)
     if not found.finite:
-        raise SheetbendError("the fit that counts diverges where the last rung ended")
+        raise SheetbendError("the last fit diverges where the last rung ended")
     climb.search.say(f"{'ended' if found.ended else 'not ended'} after {found.iterations} steps")
     return found.values
 

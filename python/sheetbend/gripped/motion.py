@@ -227,5 +227,5 @@ def gripped_ends(recording: Recording) -> tuple[int, int]:
     gripped = held == set(range(first)) | set(range(last + 1, count))
     if not gripped or first < 2 or last > count - 3 or last < first:
         fix = "name the gripped markers in `clamped`, the first two or more and the last two or more along the rope"
-        raise RecordingError("clamped", f"of {recording.name} are no two grips", sorted(held), fix)
+        raise RecordingError("clamped", f"of {recording.name} are not two grips", sorted(held), fix)
     return first - 1, last + 1

@@ -128,7 +128,7 @@ class RopeReport:
             ("better", "how many of the others (or of their pieces) it predicts better"),
             ("EI", f"with the step, {self._unit}: it depends on what else the model has"),
         )
-        headers = ("step", "fitted", "others", "unit", "ratio", "better", "EI", "stays", "seconds")
+        headers = ("step", "fitted", "others", "unit", "ratio", "better", "EI", "kept", "seconds")
         stiffness = stiffness_section(self.result)
         return [
             *([] if stiffness is None else [stiffness]),
@@ -148,14 +148,14 @@ def counted(result: FitResult, spread: str = "") -> tuple[tuple[str, str], ...]:
     seen = "markers beside the rope by as much as the residuals show (systematic)"
     model = f", {spread}" if spread else ""
     density = next((p for p in result.premises if p.name == f"{NAME}_density" and p.sd and p.value), None)
-    unseen = "a roll of the grips that nothing shows, noise of the grips"
+    unseen = "an unobserved roll of the grips, noise of the grips"
     if any(e.name == f"{NAME}_yield_share" for e in result.estimates):
-        unseen += ", an error of what had slid inside before a recording (its first frames tell)"
+        unseen += ", an error of what had slid inside before a recording (its first frames determine it)"
     if density is not None and density.sd is not None and density.value is not None:
         model += f", the density to {short(100 * density.sd / density.value, 2)} % (1 sd, unweighed markers included)"
     elif not is_over_density(result):
         unseen += ", the weight"
-    return (("counted", f"residuals that are alike over time{refined}, {seen}{model}"), ("not counted", unseen))
+    return (("counted", f"residuals that are correlated over time{refined}, {seen}{model}"), ("not counted", unseen))
 
 
 def errors(unseen: Evaluation | None, without_twist: Evaluation | None) -> dict[str, Any]:

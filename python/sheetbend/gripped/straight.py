@@ -96,7 +96,7 @@ def _of_groups(
             mine.append((middle, found[1].cost, rope))
         lost = sum(not one.group for one in ended)
         if lost:
-            search.say(f"{lost} of {count} starts lead nowhere: the motion diverges from there")
+            search.say(f"{lost} of {count} starts failed: the motion diverges")
         ends += [(*end, rows(problem, ended, fits)) for end in mine]
     ends.sort(key=lambda end: end[:2])
     return _of_others(search, [rope for _, _, rope, _ in ends]), ends[0][-1] if ends else ()

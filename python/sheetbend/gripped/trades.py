@@ -63,7 +63,7 @@ def trades(result: FitResult) -> tuple[tuple[str, str], ...]:
     GJ = next((e for e in result.estimates if quantity(e.name) == f"{NAME}_GJ"), None)
     if GJ is not None and GJ.verdict not in ("rough", "no minimum") and _open_above(GJ):
         least = "" if GJ.lower is None else f": at least {short(GJ.lower)} N m^2"
-        notes.append(("GJ", f"bounded from below only{least}; a rope stiffer in twist would move alike"))
+        notes.append(("GJ", f"bounded from below only{least}; a rope stiffer in twist would move the same way"))
     notes.append(("EA", "not fitted: the rope is taken as inextensible, and motion would bound EA from below only"))
     if is_over_density(result):
         what = "not known: motion shows stiffness and drag over it only; weigh the rope for EI and GJ in N m^2"

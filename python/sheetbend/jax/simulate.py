@@ -36,7 +36,7 @@ def simulate(
     simulates once more.
 
     Args:
-        scene: is frozen by this.
+        scene: frozen by this call.
         times: (frames,) s on the substep grid.
         solver: `Solver()` by default.
         values: quantities to change, by name: scalars.
@@ -90,9 +90,9 @@ def _quantities(scene: Scene, values: Mapping[str, Any]) -> dict[str, Any]:
     names = scene.compiled.names
     for name, value in values.items():
         if name not in names:
-            raise InputError(f"values.{name}", "is no quantity of the scene", name, choices(name, names))
+            raise InputError(f"values.{name}", "is not a quantity of the scene", name, choices(name, names))
         if jnp.shape(value) != ():
-            raise InputError(f"values.{name}", "is no scalar", jnp.shape(value), "use jax.vmap for batches")
+            raise InputError(f"values.{name}", "is not a scalar", jnp.shape(value), "use jax.vmap for batches")
     return dict(values)
 
 
@@ -100,7 +100,7 @@ def _arrays(scene: Scene, inputs: Mapping[str, Any]) -> dict[str, Any]:
     shapes = {name: shape for name, shape in scene.compiled.shapes.items() if math.prod(shape)}
     for name, array in inputs.items():
         if name not in shapes:
-            raise InputError(f"inputs.{name}", "is no input array of the scene", name, choices(name, shapes))
+            raise InputError(f"inputs.{name}", "is not an input array of the scene", name, choices(name, shapes))
         if jnp.shape(array) != shapes[name]:
             fix = f"give {shapes[name]}; use jax.vmap for batches"
             raise InputError(f"inputs.{name}", "has the wrong shape", jnp.shape(array), fix)

@@ -24,6 +24,7 @@ from .text import joined, table
 
 FIRST_MODE = 1.8751**4
 FITTED, PREDICTED = 3.0, 8.0  # periods
+SWINGS = 0.02  # of all its motion: so much of it follows the first turning point of a beam; of a door that closes, none
 AT_REST = 0.05  # of the first amplitude: how little the end moves in the last fifth, to count as a shape at rest
 LENGTH_SD = 0.05  # relative, of a length between the middles of two groups of markers
 LOSS = 0.1
@@ -106,7 +107,7 @@ def _beam_of(s: Seen, base: tuple[int, ...], tip: tuple[int, ...], length: float
     free = t >= start  # before it the beam is held, and a step hides the frequency
     frequency = first_frequency(t[free], swing[free])
     last = float(t[-1])
-    if frequency is None or start + (FITTED + 1) / frequency > last:
+    if frequency is None or start + (FITTED + 1) / frequency > last or np.ptp(swing[free]) < SWINGS * np.ptp(swing):
         return None
     late = t > max(start, last - max(2.0 / frequency, 0.2 * (last - start)))
     rest = mean_position(x[late])[list(tip)]

@@ -9,7 +9,7 @@ from types import ModuleType
 import numpy as np
 
 from ..errors import RecordingError
-from . import cantilever, cloth, flight, gripped, one_point, pendulum, rope
+from . import cantilever, cloth, flight, gripped, one_body, one_point, pendulum, rope
 from .gaps import unfilled, without_gaps
 from .objects import check_one_object
 from .seen import Seen
@@ -83,7 +83,9 @@ def draft(takes: Sequence[Take], name: str, measured: Measured | None = None) ->
         if getattr(measured, field) is not None and model is not its:
             raise RecordingError(field, f"{problem}, and this is", found.kind, fix)
     told = (*_told(takes, found.up), *found.notes)
-    return written(found.kind, name, [t.file for t in takes], told, found.unknown, found.lines)
+    stiff = model in (cloth, gripped, rope) and all(one_body.rigid(take.seen) for take in takes)
+    unknown = [*found.unknown, *([one_body.WORDS] if stiff else [])]
+    return written(found.kind, name, [t.file for t in takes], told, unknown, found.lines)
 
 
 def _described(model: ModuleType, takes: Sequence[Take], measured: Measured) -> Description | None:

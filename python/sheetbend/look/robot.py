@@ -60,7 +60,7 @@ class Poses:
             field = f"{path.name}: {problem.field}"
             raise RecordingError(field, problem.problem, problem.got, problem.fix) from problem
         if len(t) < 2:
-            raise RecordingError("poses", "are no motion over time", path.name, "give a row for each time")
+            raise RecordingError("poses", "are not a motion over time", path.name, "give a row for each time")
         return cls(file, t, x, q)
 
     def at(self, times: Array) -> tuple[Array, Array]:

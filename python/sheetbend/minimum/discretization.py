@@ -36,6 +36,8 @@ MESH, FINER_MESH = "mesh", "finer mesh"
 class Refinement:
     """How a fit is repeated on a finer time step and mesh.
 
+    Example: `sb.Refinement(finer=lambda: [model(80)])`, where `model(40)` makes the experiment that is fitted.
+
     Attributes:
         halve_step: extrapolate the estimate to the limit of short substeps; intervals include the error that remains.
         finer: function that makes the same experiments with twice the nodes. The estimate is then also extrapolated to
@@ -65,7 +67,7 @@ def wanted_refinement(given: Refinement | str | bool | None) -> Refinement:
     if given is None or given is False:
         return NONE
     fix = "give 'auto', False or a Refinement"
-    raise InputError("refine", "is no way to refine", given, fix)
+    raise InputError("refine", "is not a way to refine", given, fix)
 
 
 def settled(

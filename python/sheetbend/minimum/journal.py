@@ -268,7 +268,7 @@ class Journal(AbstractContextManager["Journal"]):
     def _stop(self, error: Exception) -> None:
         """A journal that cannot be used is given up; the fit is not."""
         self._writing = False
-        self.trouble = f"the journal {self.path} is no longer used ({error}); the fit goes on without it"
+        self.trouble = f"the journal {self.path} is no longer used ({error}); the fit continues without it"
         self._say(self.trouble)
 
 
@@ -293,7 +293,7 @@ def journaled(work: Callable[P, R]) -> Callable[P, R]:
         if path is None:
             return work(*args, **options)
         if not isinstance(path, str | Path):
-            raise InputError("journal", "is no path", path, "give a file's path, or None")
+            raise InputError("journal", "is not a path", path, "give a file's path, or None")
         with Journal(path) as journal:
             found = work(*args, **options)
             if not found.interrupted:

@@ -26,7 +26,7 @@ def judged(problem: FitProblem, end: Minimum, first: float) -> Minimum:
     left = promised(problem, end.u)
     if left <= STUCK or left * end.cost <= ROUNDING * first:
         return end
-    words = f"no step lowers the cost, though its slope promises {short(100 * left, 2)} % less (a kink, a rough motion)"
+    words = f"no step lowers the cost, but its gradient promises {short(100 * left, 2)} % less (a kink, a rough motion)"
     return replace(end, converged=left < LOST, message=f"{words}: {end.message}", doubt=words)
 
 

@@ -212,7 +212,7 @@ def shared_out(work: Callable[P, R]) -> Callable[P, R]:
             return work(*args, **options)
         if not isinstance(executor, Executor):
             fix = "give a concurrent.futures.Executor, such as ProcessPoolExecutor(2)"
-            raise InputError("executor", "is no executor", executor, fix)
+            raise InputError("executor", "is not an executor", executor, fix)
         with working_on(executor):
             return work(*args, **options)
 

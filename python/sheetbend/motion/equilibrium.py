@@ -130,7 +130,7 @@ class Equilibrium:
             forces[name][...] = finite(f"forces_bar.{name}", bar, forces[name].shape, SceneError)
         for name, given in (pressures_bar or {}).items():
             if name not in pressures:
-                raise SceneError(f"pressures_bar.{name}", "is no volume", name, f"use one of {sorted(pressures)}")
+                raise SceneError(f"pressures_bar.{name}", "is not a volume", name, f"use one of {sorted(pressures)}")
             pressures[name][...] = finite(f"pressures_bar.{name}", given, (), SceneError)
         return self._vjp(x_bar, lambda_bar)
 
@@ -151,12 +151,17 @@ def equilibrium(
 ) -> Equilibrium:
     """Find the equilibrium that a start leads to.
 
+    Examples:
+        >>> rest = sb.equilibrium(sb.rope(0.6, 20, density=0.05, EI=1e-3, clamp_start=(1, 0, 0)))
+        >>> rest.unstable_modes  # 0: stable
+        0
+
     Friction holds the points that touch their collider at the start: they stick, or slide to Coulomb's limit. What
     comes to touch later slides without friction, because nothing tells where it would have stuck. So let what is draped
     come to rest in a simulation, and start here where it ends.
 
     Args:
-        scene: is frozen by this.
+        scene: frozen by this call.
         start: (particles, 3) m, or (nodes, 3) m as of `simulate`, with the friction forces that act there; the scene's
             initial positions by default. Friction counts from there; gradients take a given start as constant.
         values: quantities to change, by name.
@@ -210,7 +215,7 @@ def equilibria(
     Starts that lead to no equilibrium are left out.
 
     Args:
-        scene: is frozen by this.
+        scene: frozen by this call.
         starts: positions to start from, each (particles, 3) or (nodes, 3) m, see `equilibrium`.
         values: quantities to change, by name.
         tolerance: m; two states count as one if no particle is farther apart than this.

@@ -129,8 +129,17 @@ def rollout(
     If this default is too little for all states, the gradient computes some again, and the logger
     "sheetbend.motion.rollout" warns of the cost.
 
+    Examples:
+        >>> rope = sb.rope(0.6, 20, density=0.05, EI=1e-3)
+        >>> run = sb.rollout(rope, [0.25], sb.Solver(h=1 / 480))
+        >>> bar = np.zeros_like(run.positions)
+        >>> bar[-1, -1, 2] = 1.0  # the loss is the final height of the free end
+        >>> gradient = run.gradient(bar)
+        >>> sorted(gradient.quantities)  # derivatives of the loss with respect to these
+        ['rope_EI', 'rope_density', 'rope_length']
+
     Args:
-        scene: is frozen by this.
+        scene: frozen by this call.
         times: (frames,) s on the substep grid, at which the loss needs positions. Memory grows with their number.
         solver: `Solver()` by default.
         values: quantities to change for this run, by name.

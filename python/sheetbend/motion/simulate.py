@@ -64,8 +64,14 @@ def simulate(
 ) -> Trajectory:
     """Simulate a scene from its initial state.
 
+    Examples:
+        >>> rope = sb.rope(0.6, 20, density=0.05, EI=1e-3, clamp_start=(1, 0, 0))
+        >>> motion = sb.simulate(rope, [0.0, 0.25, 0.5], sb.Solver(h=1 / 480))
+        >>> motion.positions.shape  # frames, particles, 3
+        (3, 21, 3)
+
     Args:
-        scene: is frozen by this.
+        scene: frozen by this call.
         times: (frames,) s, not decreasing, starting at or after 0; each must lie on the substep grid.
         solver: `Solver()` by default.
         values: quantities to change for this run, by name.

@@ -89,7 +89,7 @@ class Solver:
         if solver is None or isinstance(solver, cls):
             return solver or cls()
         fix = f"write sb.Solver(h={solver!r})" if is_number(solver) else "give such as sb.Solver(h=1e-3)"
-        raise InputError("solver", "is no Solver", solver, fix)
+        raise InputError("solver", "is not a Solver", solver, fix)
 
     def with_h(self, h: float) -> Solver:
         """The same solver at another substep."""

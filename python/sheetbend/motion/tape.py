@@ -83,7 +83,7 @@ def tape_plan(scene: Scene, times: ArrayLike, solver: Solver | None = None, scen
     """Predict what a gradient through `times` costs, without running anything.
 
     Args:
-        scene: is frozen by this.
+        scene: frozen by this call.
         times: (frames,) s on the substep grid: where the loss looks.
         solver: its `memory` is the budget, by default half of the free memory; `Solver()` by default.
         scenes: batch size; a batch goes eight scenes to a vector, one vector per thread at a time.

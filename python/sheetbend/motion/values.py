@@ -24,7 +24,7 @@ def constraint_values(
     """Evaluate the strain or angle C of every constraint.
 
     Args:
-        scene: is frozen by this.
+        scene: frozen by this call.
         positions: (particles, 3) m, or (nodes, 3) m of all nodes, which is needed where hidden nodes can move; the
             scene's initial positions by default.
         values: quantities to change, by name.

@@ -40,7 +40,7 @@ def attach(body: Body, particles: ArrayLike, *, name: str | None = None) -> str:
         SceneError: no body, no such particles, some twice, pinned or driven ones, or ones that are attached already.
     """
     if not isinstance(body, Body):
-        raise SceneError("attach.body", "is no body", body, "give what Scene.add_body returned")
+        raise SceneError("attach.body", "is not a body", body, "give what Scene.add_body returned")
     scene: Scene = body.scene  # type: ignore[assignment]  # the one that bodies are made in
     where, group = "attach.particles", f"{body.name}_attached" if name is None else name
     check_label("attach.name", group)

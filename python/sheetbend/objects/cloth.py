@@ -68,6 +68,12 @@ def cloth(
 ) -> Scene:
     """Make a scene with one cloth.
 
+    Examples:
+        >>> mesh = sb.mesh.grid(0.3, 0.4, 6, 8, "one_way")  # width and height in m, cells
+        >>> scene = sb.cloth(mesh, density=0.2, warp=60.0, shear=20.0, bending=1e-5, pinned=mesh.sets["corners"])
+        >>> len(scene.cloths["cloth"].particles)
+        63
+
     Args:
         mesh: with material coordinates along warp and weft, m.
         density: mass per area, kg/m^2.
@@ -232,7 +238,7 @@ def add_cloth(
 def _check_each(name: str, numbers: Mapping[str, Any]) -> None:
     """Refuse numbers of a fabric that are none of what they should be."""
     if not isinstance(numbers["law"], Law):
-        raise SceneError(f"{name}.law", "is no law", numbers["law"], "give such as sb.laws.Sinh(warp, weft, shear)")
+        raise SceneError(f"{name}.law", "is not a law", numbers["law"], "give such as sb.laws.Sinh(warp, weft, shear)")
     positive = {key: value for key, value in numbers.items() if key not in NOT_POSITIVE}
     check_positive(name, {key: positive.pop(key) for key in NEEDED}, positive)
     check_yield(name, numbers["yield_curvature"], numbers["yield_share"], "the bending stiffness")

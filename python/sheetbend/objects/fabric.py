@@ -45,7 +45,7 @@ class Fabric:
         if not (is_number(self.poisson) and -1 < self.poisson < 1):
             raise SceneError("fabric.poisson", "must lie between -1 and 1", self.poisson, "give sqrt(nu_uv nu_vu)")
         if not isinstance(self.law, Law):
-            raise SceneError("fabric.law", "is no law", self.law, "give such as sb.laws.Sinh(warp, weft, shear)")
+            raise SceneError("fabric.law", "is not a law", self.law, "give such as sb.laws.Sinh(warp, weft, shear)")
 
     def options(self) -> dict[str, Any]:
         """What `add_cloth` takes: `add_cloth(scene, mesh, **fabric.options())`."""

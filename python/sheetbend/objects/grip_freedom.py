@@ -80,7 +80,7 @@ class Lead:
         self.count = round(length / link) if is_number(length) else 0
         if not 1 <= self.count < len(nodes):
             fix = f"give {0.5 * link:g} to {link * (len(nodes) - 1):g} m, or leave it out"
-            raise SceneError(f"{end}_lead", "is no part of the rope that has a link", length, fix)
+            raise SceneError(f"{end}_lead", "is not a part of the rope that has a link", length, fix)
         self.scene, self.grip, self.nodes = scene, grip, nodes
         given = self.count * link
         limits = (-SHORTEST * given, LONGEST * given)

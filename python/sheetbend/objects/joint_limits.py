@@ -84,7 +84,7 @@ def checked_limits(name: str, unit: str, limits: ArrayLike) -> tuple[float, floa
     low, high = (float(a) for a in finite(f"{name}.limits", limits, (2,), SceneError))
     if not low < high:
         fix = "give (low, high), the lower one first"
-        raise SceneError(f"{name}.limits", "are no range: the first must be below the second", (low, high), fix)
+        raise SceneError(f"{name}.limits", "are not a range: the first must be below the second", (low, high), fix)
     if unit == "rad" and high - low >= 2.0 * math.pi:
         fix = "an angle is known up to a turn: give a narrower range, or leave the limits out"
         raise SceneError(f"{name}.limits", "allow a whole turn or more", (low, high), fix)

@@ -60,7 +60,7 @@ class Joint:
 
 
 def ground(scene: Scene) -> Body:
-    """The body that stands for the world: pinned at its origin, along its axes. It has no quantities."""
+    """Return the body that stands for the world: pinned at its origin, along its axes, without quantities."""
     check_scene(scene)
     if GROUND not in scene.bodies:
         x, mass = np.vstack([np.zeros(3), np.eye(3)]), np.array([1.0, 1e-12, 1e-12, 1e-12])
@@ -86,7 +86,7 @@ class Making:
         check_label("joint.name", name)
         if not isinstance(lower, Body) or not isinstance(upper, Body | None):
             fix = "give what Scene.add_body returns; None is the ground, above"
-            raise SceneError(f"{name}.lower", "is no body", (upper, lower), fix)
+            raise SceneError(f"{name}.lower", "is not a body", (upper, lower), fix)
         self.scene: Scene = lower.scene  # type: ignore[assignment]  # the one that bodies are made in
         self.upper = ground(self.scene) if upper is None else upper
         if self.upper.scene is not self.scene or self.upper is lower:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from ..arrays.checks import check_increasing, finite, is_number
 from ..arrays.types import Array
 from ..errors import SceneError
-from ..quantities.expression import Expression
+from ..quantities.expression import Expression, expressions
 from ..quantities.quantities import Term
 from .joint_limits import PER, RATE, SIZE
 from .joint_making import Making
@@ -67,13 +67,13 @@ def add_motor(made: Making, torque: Knots | None, rotor: float | None) -> None:
     if torque is None:
         return
     t, values = _knots(f"{name}.torque", torque)
-    named = len(t) <= MOST_NAMED
-    scene.add_force([dial], (0.0 if named else 1.0) * values[:, None, None] * np.eye(3)[0], t)
-    if named:
+    torques = expressions(values[:, None, None] * np.eye(3)[0])
+    if len(t) <= MOST_NAMED:
         size = float(abs(values).max()) or 1.0
         for k, value in enumerate(values):
             quantity = scene.add_quantity(f"{name}_torque_{k}", float(value), "N m", positive=False, scale=size)
-            scene.forces.add_term(dial, k, 0, quantity)
+            torques[k, 0, 0] = Expression.of(quantity)
+    scene.forces.push([dial], torques, t)
 
 
 def add_friction(made: Making, friction: float | None, slip_angle: float) -> None:

@@ -76,7 +76,7 @@ class Place:
 
 
 def on_particle(particle: int) -> Place:
-    """A marker on a particle.
+    """Place a marker on a particle.
 
     Raises:
         SceneError: not the number of a particle.
@@ -85,7 +85,7 @@ def on_particle(particle: int) -> Place:
 
 
 def between(first: int, second: int, fraction: float) -> Place:
-    """A marker on the line through two particles, `fraction` of the way (beyond them for fractions outside 0 to 1).
+    """Place a marker on the line through two particles, `fraction` of the way (beyond them outside 0 to 1).
 
     Raises:
         SceneError: not the numbers of particles.
@@ -102,7 +102,7 @@ def _number(field: str, particle: object) -> int:
 
 
 def on_body(body: Body, points: ArrayLike) -> tuple[Place, ...]:
-    """Markers at points (k, 3) m of a rigid body, in the body's frame."""
+    """Place markers at points (k, 3) m of a rigid body, in the body's frame."""
     check_kind("body", body, Body, "give what Scene.add_body returns", SceneError)
     x = np.atleast_2d(vectors("points", points))
     nodes = tuple(int(p) for p in body.particles)
@@ -110,7 +110,7 @@ def on_body(body: Body, points: ArrayLike) -> tuple[Place, ...]:
 
 
 def on_rope(rope: Rope, arc_length: float, interpolation: str = "cubic") -> Place:
-    """A marker at a place along a rope.
+    """Place a marker on a rope.
 
     Args:
         rope: as `add_rope` returned it.
@@ -135,7 +135,7 @@ def on_rope(rope: Rope, arc_length: float, interpolation: str = "cubic") -> Plac
 
 
 def along_rope(rope: Rope, count: int, interpolation: str = "cubic") -> tuple[Place, ...]:
-    """Markers at equal distances along a rope, the first and the last on its ends.
+    """Place markers at equal distances along a rope, the first and the last on its ends.
 
     Args:
         rope: as `add_rope` returned it.
@@ -155,7 +155,7 @@ def _check_rope(rope: object) -> None:
 
 
 def on_cloth(cloth: Cloth, points: ArrayLike) -> tuple[Place, ...]:
-    """Markers at places of a cloth.
+    """Place markers on a cloth.
 
     Args:
         cloth: as `add_cloth` returned it.
@@ -177,9 +177,9 @@ def on_mesh(cloth: Cloth | SolidSurface, places: Places) -> tuple[Place, ...]:
 
 
 def on_solid(solid: Solid, points: ArrayLike) -> tuple[Place, ...]:
-    """Markers at points (k, 3) m of a solid's shape at rest, on its surface or inside.
+    """Place markers at points (k, 3) m of a solid's shape at rest, on its surface or inside.
 
-    For points beside the surface take `on_mesh(solid.surface, solid.surface.mesh.project(points))`.
+    For points near the surface use `on_mesh(solid.surface, solid.surface.mesh.project(points))`.
 
     Raises:
         MeshError: a point lies outside of the solid.

@@ -48,7 +48,7 @@ class End:
     ) -> None:
         if given is not None and not isinstance(given, Grip | Junction | Facing | BodyPoint):
             fix = "give sb.Grip.fixed, from_poses or from_markers, a junction, or a point of a body"
-            raise SceneError(f"{name}.{label}", "is no grip", given, fix)
+            raise SceneError(f"{name}.{label}", "is not a grip", given, fix)
         self.name, self.label, self.side = name, label, -1.0 if label == "start" else 1.0
         self.tilts, self.shifts, self.roll = tilts, shifts, roll
         self.grip = given if isinstance(given, Grip) else None

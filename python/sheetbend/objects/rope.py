@@ -72,6 +72,11 @@ def rope(
 ) -> Scene:
     """Make a scene with one rope.
 
+    Examples:
+        >>> scene = sb.rope(0.6, 20, density=0.05, EI=1e-3, clamp_start=(1, 0, 0))  # clamped, along x
+        >>> print(scene.ropes["rope"].particles[-1])  # the number of its free end
+        20
+
     Args:
         length: m.
         segments: number of equal links.

@@ -97,7 +97,7 @@ def checked_ends(
         field = f"{name}.grip_{e.label}"
         if e.grip is not None and not isinstance(e.grip, Grip | BodyPoint):
             fix = "give sb.Grip.fixed, from_poses, from_markers or from_body, or a point of a body"
-            raise SceneError(field, "is no grip", e.grip, fix)
+            raise SceneError(field, "is not a grip", e.grip, fix)
         if e.grip is not None and e.clamp is not None:
             fix = "leave one of them out: a grip gives the direction"
             raise SceneError(field, f"stands beside clamp_{e.label}", e.clamp, fix)

@@ -213,7 +213,7 @@ def _checked_numbers(
 ) -> dict[str, Any]:
     """The numbers of a material, with what follows from them."""
     if law not in get_args(SolidLaw):
-        raise SceneError(f"{name}.law", "is no law of solids", law, f"use one of: {', '.join(get_args(SolidLaw))}")
+        raise SceneError(f"{name}.law", "is not a law of solids", law, f"use one of: {', '.join(get_args(SolidLaw))}")
     rubber = law == "neo_hookean"
     check_positive(name, {"density": density}, {"damping": damping})
     others = {"poisson": poisson, "law": law if rubber else None, "volume_row": volume_row or None}
@@ -233,7 +233,7 @@ def _checked_numbers(
     check_positive(name, {"E": E}, {})  # type: ignore[dict-item]
     if not (is_number(poisson) and -1 < poisson < 0.5):
         fix = "give one above -1 and below 0.5; 0.499 hardly changes its volume"
-        raise SceneError(f"{name}.poisson", "is no Poisson's ratio of a stable material", poisson, fix)
+        raise SceneError(f"{name}.poisson", "is not a Poisson's ratio of a stable material", poisson, fix)
     by_row = poisson > 0 if volume_row is None else bool(volume_row)
     if rubber and not by_row:
         fix = 'give a positive poisson and no volume_row, or law = "strain"'

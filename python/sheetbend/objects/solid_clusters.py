@@ -31,7 +31,7 @@ FLAT = 1e-6  # the least over the largest second moment of a cluster
 
 
 def cluster_boxes(mesh: SolidMesh, size: float) -> list[Array]:
-    """Clusters of the vertices of a mesh: those in boxes of a grid, each of which overlaps the next by half.
+    """Group the vertices of a mesh into clusters: boxes of a grid, each of which overlaps the next by half.
 
     Args:
         size: m, of a box; several elements.

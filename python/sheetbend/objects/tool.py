@@ -157,7 +157,7 @@ class Tool:
             fix = "leave out flex, or give the motion by Collider.moving"
             raise SceneError("tool.flex", "is that of a rod that bends, which no collider follows", self.flex, fix)
         if not hasattr(collider, "poses"):
-            raise SceneError("collider", "is no shape", collider, "give a Plane, Sphere, Capsule, Cylinder or Box")
+            raise SceneError("collider", "is not a shape", collider, "give a Plane, Sphere, Capsule, Cylinder or Box")
         origin = collider.poses.positions[0]
         moved = self.path(self.held(origin[None]))[:, 0] - origin
         x, w = np.split(self._pose(0.0)[1], [3])

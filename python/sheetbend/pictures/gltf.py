@@ -46,7 +46,7 @@ def write_gltf(path: str | Path, scene: Scene, motion: Trajectory, *, radius: fl
     """
     path = Path(path)
     if path.suffix.lower() != ".glb":
-        raise InputError("path", "is no binary glTF file", str(path), "give a name that ends in .glb")
+        raise InputError("path", "is not a binary glTF file", str(path), "give a name that ends in .glb")
     frames = chosen_frames(motion.times, MOST_FRAMES)
     file = _File(turn_between(up_of(scene.gravity), np.array([0.0, 1.0, 0.0])))
     times = file.accessor(motion.times[frames].astype("<f4"), "SCALAR", bounds=True) if len(frames) > 1 else None

@@ -59,7 +59,7 @@ def check_movie(field: str, path: Path, scenes: Sequence[Scene]) -> None:
         MissingExtraError: matplotlib, Pillow (GIF) or a program that encodes (MP4) is not installed.
     """
     if path.suffix.lower() not in SUFFIXES:
-        raise InputError(field, "is no GIF or MP4", str(path), f"give a file that ends in {' or '.join(SUFFIXES)}")
+        raise InputError(field, "is not a GIF or MP4", str(path), f"give a file that ends in {' or '.join(SUFFIXES)}")
     if path.is_dir():
         raise InputError(field, "is a folder", str(path), "give a file")
     bare = [scene.name for scene in scenes if not scene.sheets and not scene.ropes and not scene.bodies]

@@ -44,7 +44,9 @@ def save(drawn: Figure | Axes | Array, path: str | Path) -> None:
     with written(path) as beside:
         ending, formats = Path(path).suffix[1:].lower(), figure.canvas.get_supported_filetypes()
         if ending not in formats:
-            raise InputError("path", "has an ending that is no format", str(path), f"use one of {', '.join(formats)}")
+            raise InputError(
+                "path", "has an ending that is not a format", str(path), f"use one of {', '.join(formats)}"
+            )
         figure.savefig(beside, dpi=160, facecolor="white")
 
 

@@ -49,7 +49,7 @@ def strain_fields(
     """Fields of every triangle by name: `strain_warp`, `strain_weft`, `strain_shear`, and `membrane_energy`, J/m^2.
 
     Args:
-        scene: is frozen by this.
+        scene: frozen by this call.
         positions: (particles, 3) m, of the whole scene, or of all its nodes (nodes, 3) m.
         values: quantities to change, by name.
 

@@ -43,7 +43,7 @@ def write_usd(path: str | Path, scene: Scene, motion: Trajectory, *, radius: flo
     """
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
-        raise InputError("path", "is no USD file", str(path), f"give a name that ends in {', '.join(SUFFIXES)}")
+        raise InputError("path", "is not a USD file", str(path), f"give a name that ends in {', '.join(SUFFIXES)}")
     pxr = {name: require(f"pxr.{name}", "usd") for name in ("Usd", "UsdGeom", "Sdf", "Vt", "Gf")}
     with written(path) as beside:
         file = beside.with_name(beside.name + path.suffix)  # USD chooses the format by the suffix

@@ -28,6 +28,10 @@ RESTS = 1e-3  # of a logarithm: so near a limit a parameter has run off
 class Parameter:
     """A parameter of a fit: its initial value, bounds and prior.
 
+    Examples:
+        >>> weighed = sb.Parameter(name="rope_density", initial=0.05, prior=(0.05, 0.001))  # kg/m, mean and sd
+        >>> stiffness = sb.Parameter(name="rope_EI", initial=1e-3, lower=1e-5, upper=1e-1)  # N m^2
+
     Attributes:
         name: the `<group>_<quantity>` name used in scenes, files and reports.
         initial: the starting value, in `unit`. A tied parameter has none; a private one may leave it out and
@@ -187,7 +191,7 @@ class Parameters(Mapping[str, Parameter]):
         while here.tied_to is not None:
             if here.tied_to not in self._parameters:
                 known = ", ".join(other for other in self if other != here.name) or "none"
-                raise InputError(f"{here.name}.tied_to", "is no parameter", here.tied_to, f"name one of: {known}")
+                raise InputError(f"{here.name}.tied_to", "is not a parameter", here.tied_to, f"name one of: {known}")
             target = self._parameters[here.tied_to]
             if target.private and not here.private:
                 fix = "set private = true here too"

@@ -35,10 +35,10 @@ def start_of_poses(
     gravity: ArrayLike = (0.0, 0.0, 0.0),
     time: float | None = None,
 ) -> dict[str, Array]:
-    """The state that a body starts with, for `Scene.add_body(..., **start_of_poses(...))`.
+    """Compute the state that a body starts with from poses, for `Scene.add_body(..., **start_of_poses(...))`.
 
     Place and velocity are those of the parabola in a known gravity that fits the poses best, attitude and spin those of
-    a constant angular velocity. Give few poses, over which that is right: four at 100 Hz or more.
+    a constant angular velocity. Give few poses, so that this is a good approximation: four at 100 Hz or more.
 
     Args:
         times: (frames,) s.

@@ -29,7 +29,13 @@ _SAME_TIME = 1e-9  # s: decimal bounds such as 0.66 must find the frame stored a
 
 @dataclass(frozen=True, eq=False)
 class Recording(MarkerData):
-    """Measured markers. Immutable: every method gives a new recording, and the arrays are read-only.
+    """Measured markers over time. Immutable: every method returns a new recording, and the arrays are read-only.
+
+    Examples:
+        >>> recording = sb.Recording.load("experiments/twin/data/twin.npz")
+        >>> recording.positions.shape, recording.markers[:2]  # (frames, markers, 3) m
+        ((181, 9, 3), ('m0', 'm1'))
+        >>> first = recording.piece(0.0, 1.0).select([0, 4, 8])  # the first second of three markers
 
     Attributes:
         positions: (frames, markers, 3) float64, m; NaN (all three) where a marker was not seen.
@@ -86,8 +92,8 @@ class Recording(MarkerData):
     ) -> Recording:
         """The poses of a rigid body as markers at points of it, which `sb.on_body(body, points)` places.
 
-        Take points off one line, as far from the origin of the body's frame as an error of a place is large beside one
-        of an angle: corners of a box.
+        Choose points that are not on one line, such as the corners of a box. Their distance from the origin of the
+        body's frame weighs errors of the angles against errors of the place.
 
         Args:
             times: (frames,) s.
@@ -174,7 +180,7 @@ class Recording(MarkerData):
         for i, span in enumerate(spans):
             ends = numbers(f"hidden[{i}]", span, RecordingError)
             if ends.shape != (2,) or not np.isfinite(ends).all():
-                raise RecordingError(f"hidden[{i}]", "is no span", span, "give (start, stop) in s")
+                raise RecordingError(f"hidden[{i}]", "is not a span", span, "give (start, stop) in s")
             own = (self.times >= span[0] - _SAME_TIME) & (self.times < span[1] - _SAME_TIME)
             if not own.any():
                 known = f"{self.times[0]:.6g} to {self.times[-1]:.6g} s"

@@ -15,7 +15,7 @@ from ..quantities.wording import short
 from ..result.estimate import Estimate, Premise
 from ..result.result import FitData
 
-PLAUSIBLE = "1 % (losses: 10 %), 1 mm, 1 ms, 0.25 degrees or 0.2 m/s of the air"
+PLAUSIBLE = "1 % (drag, damping, friction: 10 %), 1 mm, 1 ms, 0.25 degrees or 0.2 m/s of wind"
 """The plausible error in most given values; in clocks and sizes it is less, in ratios of stiffnesses and in a dry
 friction that the model lacks it is more (`doubts.told.GROUPS`)."""
 LEVEL = 0.25

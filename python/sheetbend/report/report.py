@@ -131,7 +131,7 @@ def _misfit(result: FitData) -> Section:
     )
     if 0 < m.reduced_chi_square < FAR_BELOW**2:
         times = short(m.reduced_chi_square**-0.5, 2)
-        said = f"is {times} times the residuals. It is a length in m; priors count too much beside so large a one"
+        said = f"is {times} times the residuals. Check that it is in m: too large a sigma gives priors too much weight"
         notes += (("sigma", said),)
     return Section("Misfit", notes=notes)
 
@@ -154,7 +154,7 @@ def _parameters(result: FitData) -> Section:
     in_all = {e.name: _in_all(e) for e in result.estimates if e.in_all and e.in_all > FELT * (e.half_width or math.inf)}
     if in_all:
         beside = [(*row, in_all.get(row[0], "")) for row in rows]
-        words = f"half-width if given values may be off too, by up to {PLAUSIBLE}, unless residuals would show it"
+        words = f"half-width that also allows for errors of given values: {PLAUSIBLE}, or less where residuals show it"
         if wide(((*headers, IN_ALL), *beside)):
             shared = [name for name in in_all if not name.endswith("]")] or list(in_all)
             others = "" if len(shared) == len(in_all) else " (parameters.csv has those of the other parameters)"
@@ -283,7 +283,7 @@ def _course(result: FitData) -> Section:
         notes.append(("windows fitted first", ", ".join(f"{length:.3g}" for length in result.windows) + " s"))
     notes += [(f"growth in {g.name}", _grown(g)) for g in result.growth if (g.largest[1] or math.inf) > GROWTH_SHOWN]
     if result.jacobian_seconds is not None:
-        notes.append(("a Jacobian took", f"{result.jacobian_seconds:.3g} s"))
+        notes.append(("time per Jacobian", f"{result.jacobian_seconds:.3g} s"))
     if result.autocorrelation_time > 1.05:
         time = result.autocorrelation_time
         words = f"{time:.3g} of them count as one independent residual in the intervals"

@@ -11,7 +11,7 @@ from ..result.result import FitData
 from .tables import Section
 
 SMALLEST = 1e-6  # m, depth that a table has digits for
-LOSSES = "a drag or damping that the model lacks is looked for to first order, so a large one may be missed"
+LOSSES = "the search for a drag or damping that the model lacks is linear, so it may miss a large one"
 
 
 def contact_sections(result: FitData) -> list[Section]:
@@ -62,8 +62,8 @@ def _kinks(result: FitData) -> Section:
     headers = ("parameter", "begin", "end", "stick", "slide")
     note = (
         "",
-        "particles that do so at some frame at the upper end of the interval, and not at the lower end. The cost has a "
-        "kink where one does: profiles follow it, linear intervals do not",
+        "particles that do so at some frame at the upper end of the interval, but not at the lower end. Each makes a "
+        "kink in the cost: profiles follow it, linear intervals do not",
     )
     differs = any(k.begin or k.end or k.stick or k.slide for k in result.kinks)
     return Section(

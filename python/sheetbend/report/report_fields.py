@@ -23,7 +23,7 @@ def stiffness_fields(result: FitData) -> list[Section]:
             "E",
             "the stiffness of a cluster of a solid, of a triangle of a cloth along the warp, or EI of a rope's joint",
         ),
-        ("size", "rms of ln E about its mean that the prior expects; length: over which neighbors are alike"),
+        ("size", "rms of ln E about its mean that the prior expects; length: over which E changes little"),
         ("95 %", "interval of what was found from the recordings; open: they do not determine it"),
     ]
     few = {f.name: f.finest for f in result.fields if f.finest is not None and f.finest < UNSEEN}

@@ -49,7 +49,7 @@ def inputs_over_time(result: FitData) -> list[Section]:
     headers = ("input", "recording", "rms", "largest", "unit", "size", "95 %", "length", "95 %", "unit", "left")
     notes = (
         ("rms", "of what was found, along all axes together"),
-        ("size", "rms along each axis that the prior expects; length: over which the input stays alike"),
+        ("size", "rms along each axis that the prior expects; length: over which the input changes little"),
         ("95 %", "interval of what was found from the recordings; open: they do not determine it"),
         ("left", "mean share of the prior's variance that the data leave"),
     )

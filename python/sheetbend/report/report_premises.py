@@ -38,7 +38,7 @@ def premises(result: FitData) -> Section:
     rows = [(*before, *(_shift_in_words(p, e) for e in closed), *after) for before, p, after in listed]
     if len(closed) > PREMISE_COLUMNS or wide((headers, *rows)):
         most = [max(closed, key=lambda e, p=p: strength(p, e)) for _, p, _ in listed]  # type: ignore[misc]
-        headers = ("given", "value", "if off by", "moves most", "half-widths", *ends)
+        headers = ("given", "value", "if off by", "largest shift", "half-widths", *ends)
         rows = [
             (*before, f"{e.name} {_shift_in_words(p, e)}", short(strength(p, e), 2), *after)
             for (before, p, after), e in zip(listed, most, strict=True)
@@ -48,7 +48,7 @@ def premises(result: FitData) -> Section:
         sizes = ", ".join(f"{p.name} {right_to[p.name]}" for p in every if p.name in right_to)
         notes = (
             (
-                "must be right to",
+                "required accuracy",
                 f"{sizes}. A larger error may move a parameter out of its interval without a trace in the residuals",
             ),
             *notes,

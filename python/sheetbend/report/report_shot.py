@@ -8,8 +8,8 @@ from ..result.shot import ShotMotion
 from .tables import Section
 
 PUSHES = (
-    ", if these come at random. A friction or drag that the model lacks moves the parameters; it is named where a fit "
-    "without `shooting` shows it"
+    ", if these are random. A friction or drag that the model lacks moves the parameters; the report names it where a "
+    "fit without `shooting` shows it"
 )
 
 
@@ -23,11 +23,11 @@ def shot_motions(result: FitData) -> Section:
     ]
     lifted = sum((m.windows - 1) * m.numbers for m in result.shot)
     notes = [
-        ("lifted", f"{lifted} numbers of states at borders between windows were fitted besides the parameters"),
+        ("lifted", f"{lifted} numbers of states at borders between windows were fitted as well as the parameters"),
         (
             "the model loses",
-            "by so much per second a window misses the next one; the intervals of the parameters "
-            "hold for gaps of this size"
+            "how far the end of a window is from the start of the next, per second of motion; the intervals of the "
+            "parameters allow for gaps of this size"
             + (PUSHES if any(m.lower is None or m.lower > 0.0 for m in result.shot) else ""),
         ),
         (

@@ -42,11 +42,11 @@ def groups_of_starts(result: FitData) -> Section:
     headers = ("starts", "cost of its fit", "raced to", "at most", *names)
     notes = []
     if groups:
-        words = "end of the last window; starts are one group where that window tells their ends apart by little"
-        notes.append(("raced to", f"cost at the {words}, and the best of each group is fitted as a whole"))
+        words = "cost at the end of the last window. Starts whose ends that window hardly tells apart form a group; "
+        notes.append(("raced to", words + "the best of each group is fitted to the whole motion"))
     if len(groups) > _GROUPS:
         notes.append(("not listed", f"{len(groups) - _GROUPS} groups with higher costs; fit.json has all starts"))
     lost = [start for start in result.starts if start.cost is None and start.group is None and start.first]
     if lost:
-        notes.append(("led nowhere", f"{len(lost)} of {len(result.starts)}: the motion diverges from there"))
+        notes.append(("failed", f"{len(lost)} of {len(result.starts)}: the motion diverges from there"))
     return Section("Groups of starts", headers if rows else (), tuple(rows), tuple(notes))

@@ -89,7 +89,7 @@ class Scores:
 
 
 def coordinate_error(recording: Recording, predicted: ArrayLike, given: int = 1) -> float:
-    """Mean absolute coordinate error, m: the mean of |predicted - measured| over x, y and z of all samples that count.
+    """Compute the mean absolute coordinate error, m: the mean of |predicted - measured| over x, y, z and all samples.
 
     All markers count, clamped ones included, wherever they were seen in the frames after those given. This is the
     measure of the DEFORM rope data; a root mean square distance in space (`baseline.rms_about`) is larger.

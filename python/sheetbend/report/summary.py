@@ -73,7 +73,7 @@ def _residuals(result: FitData) -> str:
     if ratio > ALIKE:
         words += f", {short(ratio, 2)} times what the given noise explains"
     elif not math.isnan(ratio):
-        words += f", {'as the given noise explains' if ratio > 1 / ALIKE else 'less than the given noise explains'}"
+        words += f", {'as expected from' if ratio > 1 / ALIKE else 'less than'} the given noise"
     return words
 
 
@@ -127,7 +127,7 @@ def _before_use(result: FitData) -> Iterator[str]:
         yield "continue the fit, for example with `sheetbend fit --resume`, before you use the values"
     elif not result.converged:
         windows = ", or fit the beginning of the motion first (`windows`)" if result.growth else ""
-        yield f"raise `max_iterations`, begin nearer to the answer{windows}"
+        yield f"raise `max_iterations`, start nearer to the answer{windows}"
     if verdicts & {*UNSOUND}:
         yield f'do not use {_names(result, UNSOUND)} before you have read "What contradicts this fit"'
     worse = [name for name, r in _held_out(result).items() if r.baseline and r.held_out and r.held_out > r.baseline]

@@ -89,7 +89,7 @@ def flush_left(section: Section) -> list[bool]:
         "unit",
         "verdict",
         "step",
-        "stays",
+        "kept",
         "rope",
         "given",
         "change",

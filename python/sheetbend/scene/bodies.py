@@ -172,7 +172,7 @@ class Path:
         """
         if not all(hasattr(poses, a) for a in ("times", "positions", "quaternions")):
             fix = "give sb.Tool(times, positions, quaternions)"
-            raise SceneError(f"{name}.poses", "are no poses over time", type(poses).__name__, fix)
+            raise SceneError(f"{name}.poses", "are not poses over time", type(poses).__name__, fix)
         t = finite(f"{name}.poses.times", poses.times, None, SceneError).ravel()
         check_increasing(f"{name}.poses.times", t)
         if len(t) < KNOTS:

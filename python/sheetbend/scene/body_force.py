@@ -21,8 +21,7 @@ def push_body(
     """See `Scene.add_force`.
 
     Raises:
-        SceneError: a body of another scene, shapes, NaN, more named knots than `MOST_NAMED`, or other knots than those
-            of earlier forces.
+        SceneError: a body of another scene, shapes, NaN, or more named knots than `MOST_NAMED`.
     """
     if point.body.scene is not scene:
         raise SceneError("add_force.particles", "are on a body of another scene", point.body.name, "use its own scene")

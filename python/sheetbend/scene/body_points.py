@@ -16,7 +16,7 @@ from .body import Body
 
 
 def box_corners(sides: ArrayLike, center: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
-    """The corners (8, 3) m of a box along the axes of a body's frame, for `Scene.add_contact(..., points=...)`.
+    """Return the corners (8, 3) m of a box along the axes of a body's frame, for `Scene.add_contact(..., points=...)`.
 
     Args:
         sides: (3,) m, whole.
@@ -57,7 +57,7 @@ def points_of(what: object, points: ArrayLike | TriangleMesh | None, name: str |
     where = f"{name or 'contact'}.points"
     if not isinstance(what, Body):
         if points is not None:
-            raise SceneError(where, "are given of what is no body", type(what).__name__, "leave them out")
+            raise SceneError(where, "are given of what is not a body", type(what).__name__, "leave them out")
         return None
     if points is None:
         fix = "give those that may touch, (n, 3) m in its frame, such as points=sb.box_corners(sides)"

@@ -184,7 +184,7 @@ class Contacts:
         if not isinstance(collider, Collider):
             raise SceneError(
                 "contact.collider",
-                "is no shape",
+                "is not a shape",
                 collider,
                 "give a Plane, Sphere, Capsule, Cylinder, Box or DistanceField",
             )

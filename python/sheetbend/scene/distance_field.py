@@ -76,7 +76,9 @@ class DistanceField(Collider):
     def __post_init__(self) -> None:
         label = self.name or self.shape
         if not isinstance(self.mesh, TriangleMesh):
-            raise SceneError(f"{label}.mesh", "is no mesh", self.mesh, "give a TriangleMesh, such as of sb.read_mesh")
+            raise SceneError(
+                f"{label}.mesh", "is not a mesh", self.mesh, "give a TriangleMesh, such as of sb.read_mesh"
+            )
         given = {"spacing": self.spacing, "margin": self.margin}
         self._positive(**{key: value for key, value in given.items() if value is not None})
         self._placed()

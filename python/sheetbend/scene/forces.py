@@ -27,13 +27,33 @@ def spread_over(forces: ArrayLike, shape: tuple[int, ...]) -> Array:
         raise SceneError("add_force.forces", "has the wrong shape", given.shape, f"give {shape}") from error
 
 
-def at_times(knots: Array, times: Array) -> Array:
-    """(times, knots) weights of knots in what is linear between them and constant outside."""
-    return np.stack([np.interp(times, knots, one) for one in np.eye(len(knots))], axis=1)
+def between(knots: Array, values: Array, times: Array) -> Array:
+    """(times, ...) what is linear between knots, where it has values (knots, ...), and constant outside."""
+    columns = [np.interp(times, knots, column) for column in values.reshape(len(knots), -1).T]
+    return np.stack(columns, axis=1).reshape(len(times), *values.shape[1:])
+
+
+def shares(knots: Array, times: Array) -> list[list[tuple[int, float]]]:
+    """By knot, the times at which its value counts and its weight there, in what is linear between knots."""
+    found = []
+    for k in range(len(knots)):
+        first, last = max(k - 1, 0), min(k + 1, len(knots) - 1)
+        low = 0 if k == 0 else int(np.searchsorted(times, knots[first]))
+        high = len(times) if k == len(knots) - 1 else int(np.searchsorted(times, knots[last], "right"))
+        hat = (np.arange(first, last + 1) == k).astype(float)
+        weights = np.interp(times[low:high], knots[first : last + 1], hat)
+        found.append([(low + int(i), float(weights[i])) for i in np.flatnonzero(weights)])
+    return found
+
+
+def _checked(times: ArrayLike) -> Array:
+    t = finite("add_force.times", times, None, SceneError).ravel()
+    check_increasing("add_force.times", t)
+    return t
 
 
 class Forces:
-    """The forces of a scene, at one set of knots.
+    """The forces of a scene, at one set of knots: those of all forces.
 
     Attributes:
         particles: that forces act on.
@@ -50,30 +70,28 @@ class Forces:
     def add(self, particles: Array, forces: ArrayLike, times: ArrayLike) -> None:
         """See `Scene.add_force`."""
         which: list[int] = particles.tolist()
-        t = self._checked(times)
+        t = _checked(times)
         f = spread_over(forces, (len(t), len(which), 3))
         twice = set(which) & set(self.particles)
         if twice:
             fix = "sum the forces and add them once"
             raise SceneError("add_force.particles", "are loaded already", sorted(twice), fix)
-        self.times = t
+        self._join(t)
         self.particles += which
-        self._values += [f[:, k] for k in range(len(which))]
+        self._values += [between(t, f[:, k], self.times) for k in range(len(which))]
 
     def push(self, particles: list[int], forces: Array, times: ArrayLike) -> None:
         """Add expressions (knots, k, 3) N to the forces on particles, which may be loaded already."""
-        t = self._checked(times)
-        self.times = t
+        t = _checked(times)
+        self._join(t)
         self._load(particles)
+        by = shares(t, self.times)
         for factors, coefficients in by_factors(forces).items():
             self._terms += [
-                (particles[k], int(knot), int(axis), float(coefficients[knot, k, axis]), factors)
+                (particles[k], at, int(axis), share * float(coefficients[knot, k, axis]), factors)
                 for knot, k, axis in np.argwhere(coefficients != 0.0)
+                for at, share in by[knot]
             ]
-
-    def add_term(self, particle: int, knot: int, axis: int, quantity: str) -> None:
-        """Add a quantity to a force along an axis at a knot."""
-        self._terms.append((particle, knot, axis, 1.0, ((quantity, "identity"),)))
 
     def vary(
         self,
@@ -88,16 +106,13 @@ class Forces:
         Args:
             particles: that it acts on, which may be loaded already.
             weights: of the force on each.
-            times: (knots,) s. Forces that were added before go on as they were: all take the knots of both.
+            times: (knots,) s.
             shapes: (knots, modes).
             names: by mode and axis.
         """
-        every = np.union1d(self.times, times)
-        if self.particles:
-            self._move_to(every)
-        self.times = every
+        self._join(times)
         self._load(particles)
-        at_knots = at_times(times, every) @ shapes
+        at_knots = between(times, shapes, self.times)
         parts: dict[Factors, list[tuple[int, float]]] = {}
         for particle, weight in zip(particles, weights, strict=True):
             for factors, share in weight.parts.items():
@@ -114,24 +129,21 @@ class Forces:
         self.particles += new
         self._values += [np.zeros((len(self.times), 3)) for _ in new]
 
-    def _move_to(self, times: Array) -> None:
-        """Take other knots (knots,), among which are all of those before."""
-        by = at_times(self.times, times)
-        self._values = [by @ f for f in self._values]
+    def _join(self, times: Array) -> None:
+        """Take these knots (knots,) too. Forces that were added before go on as they were."""
+        before, self.times = self.times, np.union1d(self.times, times) if self.particles else times
+        if not self.particles or np.array_equal(before, self.times):
+            return
+        by = shares(before, self.times)
+        self._values = [between(before, f, self.times) for f in self._values]
         self._terms = [
-            (p, int(knot), axis, share * float(by[knot, before]), factors)
-            for p, before, axis, share, factors in self._terms
-            for knot in np.flatnonzero(by[:, before])
+            (p, at, axis, weight * share, factors)
+            for p, knot, axis, share, factors in self._terms
+            for at, weight in by[knot]
         ]
-        self._varied = [(nodes, share, by @ shape, *more) for nodes, share, shape, *more in self._varied]
-
-    def _checked(self, times: ArrayLike) -> Array:
-        t = finite("add_force.times", times, None, SceneError).ravel()
-        check_increasing("add_force.times", t)
-        if self.particles and (t.shape != self.times.shape or (t != self.times).any()):
-            fix = "use one set of knots"
-            raise SceneError("add_force.times", "differ from those of forces added before", len(t), fix)
-        return t
+        self._varied = [
+            (nodes, share, between(before, shape, self.times), *more) for nodes, share, shape, *more in self._varied
+        ]
 
     def terms(self) -> list[Term]:
         """Their places are known once every loaded particle is."""

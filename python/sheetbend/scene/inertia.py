@@ -43,7 +43,7 @@ class Inertia:
         m = np.diag(m) if m.shape == (3,) else m
         if m.shape != (3, 3) or abs(m - m.T).max() > SLACK * abs(m).max():
             fix = "give three principal moments, or a symmetric matrix (3, 3)"
-            raise SceneError("inertia", "is no symmetric matrix", m.tolist(), fix)
+            raise SceneError("inertia", "is not a symmetric matrix", m.tolist(), fix)
         moments = np.linalg.eigvalsh(m)
         if not moments.sum() - 2.0 * moments[2] > SLACK * moments[2]:
             problem = f"is that of no body: {moments[2]:g} is not less than {moments[0]:g} + {moments[1]:g}"
@@ -110,7 +110,7 @@ class Inertia:
             SceneError: no part, or what is no Inertia.
         """
         if not isinstance(parts, Sequence) or not parts or not all(isinstance(p, Inertia) for p in parts):
-            raise SceneError("inertia.parts", "are no bodies", parts, "give a list of one or more sb.Inertia")
+            raise SceneError("inertia.parts", "are not bodies", parts, "give a list of one or more sb.Inertia")
         mass = sum(p.mass for p in parts)
         center = np.sum([p.mass * p.center for p in parts], axis=0) / mass
         return cls(mass, np.sum([p.about(center) for p in parts], axis=0), center)

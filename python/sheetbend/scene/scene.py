@@ -134,12 +134,12 @@ class Scene(BlownScene):
         Args:
             particles: (k,), or what `Body.point` returns.
             forces: (knots, k, 3) N in the world's axes; on a point (knots, 3).
-            times: (knots,) s.
+            times: (knots,) s; other forces may have others.
             name: of a force on a point, which makes it the quantities `<name>_x`, `_y`, `_z` N, and with several knots
                 (at most 50) `<name>_x_0`, `_y_0`, ...; without one its numbers are none.
 
         Raises:
-            SceneError: shapes, NaN, or other knots than an earlier call's.
+            SceneError: shapes, or NaN.
         """
         self._building()
         if isinstance(particles, BodyPoint):
@@ -187,7 +187,7 @@ class Scene(BlownScene):
         """
         self._building()
         if not isinstance(kind, str) or kind not in KINDS:
-            raise SceneError("kind", "is no known constraint", kind, f"use one of: {', '.join(KINDS)}")
+            raise SceneError("kind", "is not a known constraint", kind, f"use one of: {', '.join(KINDS)}")
         name = kind if name is None else name
         check_label("add_constraints.name", name)
         if any(g.name == name for g in self.groups):

@@ -40,7 +40,7 @@ def save_scene(scene: Scene, path: str | Path) -> None:
     one for each mode, which a fit of the loaded scene gives no prior.
 
     Args:
-        scene: is frozen by this.
+        scene: frozen by this call.
         path: is replaced only once the file is whole.
 
     Raises:

@@ -165,11 +165,11 @@ class Judge:
         t = critical_t(float(spread.degrees[index]))
         reach = t * math.sqrt(spread.matrix[index, index])
         if reach <= _ROUNDING * max(abs(self.internal[column]), 1.0) and spread.residual_variance > 1:
-            words = "its interval would be narrower than rounding: no motion tells a parameter so well"
+            words = "its interval would be narrower than rounding: no motion determines a parameter so well"
             return open_estimate(parameter, value, words, more, "rough")
         ends = linear_ends(parameter, self.internal[column], reach)
         if spread.residual_variance == 0 and reach == 0:
-            note += "; the residuals are exactly zero, so that nothing tells how wrong it may be"
+            note += "; the residuals are exactly zero, so nothing shows how wrong it may be"
         if self._limit(column) is not None:
             ends = clipped(parameter, ends)
         return Linear(column, parameter, value, reach, ends, more, note, shaken)

@@ -237,7 +237,7 @@ def chosen(curve: Curve, cycle: int) -> Cycle:
         raise InputError("cycle", "must be a whole number", cycle, "count from 0; -1 is the last")
     if not -len(cycles) <= cycle < len(cycles):
         raise InputError(
-            "cycle", f"is none of the {len(cycles)} of {curve.name}", cycle, "count from 0; -1 is the last"
+            "cycle", f"is not one of the {len(cycles)} of {curve.name}", cycle, "count from 0; -1 is the last"
         )
     return cycles[cycle]
 

@@ -149,7 +149,7 @@ def check_test(curve: Curve, test: str) -> None:
     """
     check_kind("curve", curve, Curve, "read the file with textile.read_curves")
     if curve.test != test:
-        raise InputError(curve.name, f"is no test of {test}", curve.test, "read the file with that test=")
+        raise InputError(curve.name, f"is not a test of {test}", curve.test, "read the file with that test=")
 
 
 def _sides(curve: Curve, cycle: int) -> list[Cycle]:
@@ -160,7 +160,7 @@ def _sides(curve: Curve, cycle: int) -> list[Cycle]:
         own = [c for c in curve.cycles() if sign * float(c.loading.deformation[-1]) > 0.0]
         if own and not -len(own) <= cycle < len(own):
             raise InputError(
-                "cycle", f"is none of the {len(own)} of {curve.name}", cycle, "count from 0; -1 is the last"
+                "cycle", f"is not one of the {len(own)} of {curve.name}", cycle, "count from 0; -1 is the last"
             )
         found += [own[cycle]] if own else []
     return found

@@ -122,7 +122,7 @@ def extensions(curves: Sequence[Curve], cycle: int, loads: Mapping[str, float]) 
 
 def _tests(curves: Sequence[Curve], test: str) -> Sequence[Curve]:
     if same_test(curves)[0].test != test:
-        raise InputError("curves", f"are no tests of {test}", curves[0].test, f"read the files with test={test!r}")
+        raise InputError("curves", f"are not tests of {test}", curves[0].test, f"read the files with test={test!r}")
     return curves
 
 

@@ -113,7 +113,9 @@ def _table(path: Path) -> Array:
         if len(numbers) == 2:
             rows.append(numbers)
         elif cells and rows:
-            raise RecordingError(f"{path.name}, line {number}", "is no point", line[:60], "give x and y in each line")
+            raise RecordingError(
+                f"{path.name}, line {number}", "is not a point", line[:60], "give x and y in each line"
+            )
     if len(rows) < 8:
         raise RecordingError(path.name, "holds too few points for an outline", len(rows), "give x and y in each line")
     return np.array(rows)

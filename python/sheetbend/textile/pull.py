@@ -247,7 +247,7 @@ def checked_pulls(curves: Sequence[Curve]) -> None:
         InputError: no curves, curves of another test, of different widths or pretensions, or that share a name.
     """
     if same_test(curves)[0].test != "tension":
-        raise InputError("curves", "are no pulls", curves[0].test, "give curves of tension")
+        raise InputError("curves", "are not pulls", curves[0].test, "give curves of tension")
     alike = sorted({f"{c.width} m, {c.pretension} N/m" for c in curves})
     if len(alike) > 1:
         fix = "fit each kind by itself, or cut them alike"

@@ -63,7 +63,7 @@ class Levels:
         start, top = max(float(mean.deformation[0]), 0.0), float(mean.deformation[-1])
         if up_to is not None:
             if not start < up_to <= top:
-                raise InputError("up_to", "is no strain of the curves", up_to, f"choose one up to {top:.4g}")
+                raise InputError("up_to", "is not a strain of the curves", up_to, f"choose one up to {top:.4g}")
             top = up_to
         strain = start + (top - start) * np.arange(1, _LEVELS + 1) / _LEVELS
         ways = [chosen(c, cycle).way(way) for c in curves]

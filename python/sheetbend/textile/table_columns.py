@@ -43,7 +43,7 @@ class Choice:
                 raise InputError(field, "name no role", unknown, f"use {', '.join(roles)}")
         for role, text in self.units.items():
             if unit(text) is None:
-                raise InputError(f"units[{role!r}]", "is no unit known here", text, f"use one like {EXAMPLES}")
+                raise InputError(f"units[{role!r}]", "is not a known unit", text, f"use one like {EXAMPLES}")
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,7 @@ class TextTable:
         if _number(cell, other) is not None:
             told = f"has the decimal mark {other!r} where the file has {self.mark!r}"
             self.refuse(line, index, told, cell, "write one decimal mark throughout, or tell it by decimal=")
-        self.refuse(line, index, "is empty above other numbers" if not cell else "is no number", cell, _HINT)
+        self.refuse(line, index, "is empty above other numbers" if not cell else "is not a number", cell, _HINT)
 
     def refuse(self, line: int, index: int, problem: str, got: object, fix: str) -> NoReturn:
         name = self.names[index] or "no name"

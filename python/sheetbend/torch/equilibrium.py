@@ -101,7 +101,7 @@ def equilibrium(
     The result is float32 if all tensors given are float32, else float64; everything is computed in float64.
 
     Args:
-        scene: is frozen by this.
+        scene: frozen by this call.
         start: (particles, 3) m, or (nodes, 3) m as of `sheetbend.simulate`, not differentiated; the scene's initial
             positions by default.
         values: quantities to change, by name: tensors (*batch,), or plain numbers.

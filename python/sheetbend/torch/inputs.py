@@ -68,7 +68,7 @@ class InputMap:
             fix = f"give it in `inputs`: inputs={{{name!r}: ...}}"
             raise InputError(field, "is an input array of the scene, and no quantity", name, fix)
         if name not in self._names:
-            raise InputError(field, "is no quantity of the scene", name, choices(name, self._names))
+            raise InputError(field, "is not a quantity of the scene", name, choices(name, self._names))
         return () if isinstance(value, int | float) else _dense(field, value)
 
     def _batch_of_array(self, name: str, array: Tensor) -> tuple[int, ...]:
@@ -76,7 +76,7 @@ class InputMap:
         present = [n for n, (_, size) in self._given.items() if size > 0]
         if name not in present:
             fix = f"call {NEEDS[name]} first" if name in NEEDS else choices(name, present)
-            raise InputError(field, "is no input array of the scene", name, fix)
+            raise InputError(field, "is not an input array of the scene", name, fix)
         if name in self._without_effect:
             raise InputError(field, "has no effect on this scene", name, self._without_effect[name])
         shape, wanted = _dense(field, array), self._shapes[name]

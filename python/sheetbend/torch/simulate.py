@@ -69,7 +69,7 @@ def simulate(
     scene to a rollout, second derivatives one at a time.
 
     Args:
-        scene: is frozen by this.
+        scene: frozen by this call.
         times: (frames,) s on the substep grid.
         solver: `Solver()` by default; its `memory` is the budget of a gradient (see `sheetbend.tape_plan`).
         values: quantities to change, by name: tensors (*batch,), or plain numbers.

@@ -47,7 +47,7 @@ class Stepper:
     the states: about 100 bytes per node and substep.
 
     Args:
-        scene: is frozen by this.
+        scene: frozen by this call.
         solver: `Solver()` by default. Its `memory` has no meaning here.
         dtype: of the positions and velocities that states return. Tensors given to a stepper may have any floating
             type; the states themselves stay float64.
@@ -138,7 +138,7 @@ class Stepper:
         """
         if not isinstance(state, State):
             fix = "give what `start`, or the call before, returned"
-            raise InputError("state", "is no State", type(state).__name__, fix)
+            raise InputError("state", "is not a State", type(state).__name__, fix)
         flat = self._default if inputs is None else inputs
         numbers = state.numbers
         if numbers.shape[-1] != self._width:
@@ -166,7 +166,7 @@ class Stepper:
         if dims < 0 or array.shape[dims:] != shape or not array.is_floating_point():
             got = tuple(array.shape) if isinstance(array, Tensor) else type(array).__name__
             fix = f"give a floating tensor {shape}, batch dimensions before it if any"
-            raise InputError(name, "is no tensor of the right shape", got, fix)
+            raise InputError(name, "is not a tensor of the right shape", got, fix)
         return array.double(), array.shape[:dims]
 
     def _core(self, names: tuple[str, ...]) -> Core:

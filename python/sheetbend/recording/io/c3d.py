@@ -57,7 +57,7 @@ def read(path: Path) -> MarkerData:
     """
     data = path.read_bytes()
     if len(data) < _BLOCK or data[1] != _KEY:
-        raise RecordingError(str(path), "is no C3D file", f"{len(data)} bytes", "export it again as C3D")
+        raise RecordingError(str(path), "is not a C3D file", f"{len(data)} bytes", "export it again as C3D")
     try:
         machine, said = _parameters(data)
         return _recording(path, data, machine, said)

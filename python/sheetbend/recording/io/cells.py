@@ -34,7 +34,7 @@ def lines(path: Path) -> list[tuple[int, str]]:
         text = data.decode("utf-16" if wide else "utf-8-sig")
     except UnicodeDecodeError as error:
         if wide or any(byte < 32 and byte not in b"\t\n\r\f" for byte in data[:_JUDGED]):
-            raise RecordingError(str(path), "is no UTF-8 text", str(error), "save it as a UTF-8 CSV") from error
+            raise RecordingError(str(path), "is not UTF-8 text", str(error), "save it as a UTF-8 CSV") from error
         text = data.decode("cp1252", errors="replace")
     return list(enumerate(re.split("\r\n|\r|\n", text), start=1))
 
@@ -57,7 +57,7 @@ def number(path: Path, line: int, cell: str) -> float:
         found = float(cell.replace("_", "?"))  # Python would read 1_0 as ten
     except ValueError:
         fix = "write a point as decimal mark, and an empty cell or nan for a marker not seen"
-        refuse(path, line, "holds a cell that is no number", cell, fix)
+        refuse(path, line, "holds a cell that is not a number", cell, fix)
     if np.isinf(found):
         refuse(path, line, "holds an infinite number; leave the cell empty for a marker not seen", cell)
     return found

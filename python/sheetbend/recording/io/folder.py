@@ -50,7 +50,7 @@ def read_recordings(
     """
     root = Path(folder)
     if not isinstance(pattern, str) or not pattern or Path(pattern).is_absolute():
-        raise RecordingError("pattern", "is no pattern of names", pattern, "give such as '*.csv'")
+        raise RecordingError("pattern", "is not a pattern of names", pattern, "give such as '*.csv'")
     if not isinstance(refused, dict | None):
         raise RecordingError("refused", "must be a dict", refused, "give an empty one")
     known = _known(pattern)
@@ -102,7 +102,7 @@ def _files(root: Path, pattern: str, known: Sequence[str]) -> tuple[list[Path], 
         fix = "give the folder that holds the files" + (
             f"; {root.parent.name} holds {', '.join(beside[:MOST_NAMED])}" if beside else ""
         )
-        raise RecordingError("folder", "is no folder", str(root), fix)
+        raise RecordingError("folder", "is not a folder", str(root), fix)
     for own in (pattern, f"**/{pattern}"):
         matching = sorted(
             (p for p in root.glob(own) if p.is_file() and not _hidden(p.relative_to(root))), key=by_number

@@ -42,7 +42,7 @@ def read_body(path: Path, text: list[tuple[int, str]], body: str | None) -> tupl
     bodies = list(dict.fromkeys(names[k] for k in range(2, len(axes)) if types[k] == "Rigid Body"))
     if body not in bodies and not (body is None and len(bodies) == 1):
         fix = f"name one of: {', '.join(bodies) or 'none, export it with rigid bodies'}"
-        raise RecordingError("body", "is no rigid body of the take" if body else "is missing", body, fix)
+        raise RecordingError("body", "is not a rigid body of the take" if body else "is missing", body, fix)
     own = [k for k in range(2, len(axes)) if types[k] == "Rigid Body" and names[k] == (body or bodies[0])]
     column = {(given[k], axes[k]): k for k in own}
     wanted = [("Position", axis) for axis in "XYZ"] + [("Rotation", axis) for axis in "XYZW"]

@@ -75,7 +75,7 @@ def plain_arrays(
         archive = zipfile.ZipFile(path)
     except _DAMAGE as error:
         write_it = "write it with numpy.savez or Recording.save"
-        raise RecordingError(str(path), "is no NPZ archive, or a damaged one", str(error), write_it) from error
+        raise RecordingError(str(path), "is not an NPZ archive, or a damaged one", str(error), write_it) from error
     with archive:
         members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
         missing = [key for key in required if key not in members]
@@ -97,7 +97,7 @@ def single_array(path: Path) -> np.ndarray:
         return _unpacked(path.read_bytes())
     except _DAMAGE as error:
         fix = "write it with numpy.save, of plain numbers"
-        raise RecordingError(str(path), "is no NPY file, or a damaged one", str(error), fix) from error
+        raise RecordingError(str(path), "is not an NPY file, or a damaged one", str(error), fix) from error
 
 
 def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path, key: str) -> np.ndarray:

@@ -81,7 +81,7 @@ def arrays(path: Path, needed: Collection[str] = ()) -> Content | dict[str, Cont
     except RecordingError:
         raise
     except _DAMAGE as error:
-        raise RecordingError(str(path), "is no pickle, or a damaged one", str(error), _AGAIN) from error
+        raise RecordingError(str(path), "is not a pickle, or a damaged one", str(error), _AGAIN) from error
 
 
 def _content(path: Path, what: str, value: object) -> Content:
@@ -306,5 +306,5 @@ class _Machine:
     def refuse(self, name: str, argument: Any) -> None:
         words = f"extension code {argument}, whose meaning is not in the file" if name.startswith("EXT") else name
         fix = "pickle NumPy arrays of numbers alone, or export the file again if it is damaged"
-        problem = "is no pickle of arrays, or a damaged one, and was not opened"
+        problem = "is not a pickle of arrays, or a damaged one, and was not opened"
         raise RecordingError(str(self.path), problem, words, fix)

@@ -45,7 +45,7 @@ def _read(path: Path, body: str | None) -> tuple[Array, Array, Array]:
         return motive.read_body(path, text, body)
     if body is not None:
         fix = "leave it out: a file of poses has one body alone"
-        raise RecordingError("body", f"is given, and {path.name} is no take of Motive", body, fix)
+        raise RecordingError("body", f"is given, and {path.name} is not a take of Motive", body, fix)
     if path.suffix.lower() == ".npz":
         fix = "store times (poses,), positions (poses, 3) and quaternions (poses, 4) under these names"
         arrays = plain_arrays(path, ARRAYS, fix=fix)

@@ -30,7 +30,7 @@ def read(path: Path) -> MarkerData:
     ]
     if len(rows) <= _LEAST or not rows[0][1][0].startswith("PathFileType"):
         fix = "export it again; above the frames stand PathFileType, keys, values, names and axes"
-        raise RecordingError(str(path), "is no TRC file with frames", f"{len(rows)} lines", fix)
+        raise RecordingError(str(path), "is not a TRC file with frames", f"{len(rows)} lines", fix)
     (_, keys), (at, values), (line, names), (_, axes), *frames = rows[1:]
     told = dict(zip(keys, values, strict=False))
     if told.get("Units") not in METERS:
