@@ -87,7 +87,7 @@ def judged_parameters(
         discretization=refined,
         systematic=systematic,
         profiler=None if profiles is None else profiles.each,
-        nuisance=Nuisance(J[behind:], sum(map(problem.core.absorbed, range(len(problem.experiments))))),
+        nuisance=Nuisance(J[behind:], problem.absorbed),
         errors=driven_errors(problem, u, FEW),
         limits=impossible_ahead(problem, u, r, J),
         fixes=_beyond_scenes(problem),
@@ -161,7 +161,7 @@ def misfit(problem: FitProblem, u: Array) -> Misfit:
     layout = problem.rows_layout()
     seen = layout.clocks == 0
     beyond = float(np.mean(sigma[layout.recording[seen]] ** 2 * (r[:rows][seen] ** 2 - 1.0)))
-    taken = len(problem.parameters.free) + sum(map(problem.core.absorbed, range(len(sigma))))
+    taken = len(problem.parameters.free) + problem.absorbed
     return Misfit(
         reduced_chi_square=float(r[:rows] @ r[:rows]) / max(rows - taken, 1.0),
         smallest_sigma=float(sigma.min()),
