@@ -182,12 +182,14 @@ def warnings_of(
         ahead: what a step that was not taken would move (`stationary.unfinished`).
     """
     warnings, best = [], ends[0]
+    inputs = {mode: own.name for e in problem.experiments for own in e.scene.over_time.values() for mode in own.modes}
     for verdict in UNSOUND:
-        if names := [e.name for e in estimates if e.verdict == verdict]:
+        if such := [e.name for e in estimates if e.verdict == verdict]:
+            names = ", ".join(dict.fromkeys(inputs.get(name.partition("[")[0], name) for name in such))
             also = (
-                "" if len(names) == len(estimates) else "; what is wrong with one number may have drawn off the others"
+                "" if len(such) == len(estimates) else "; what is wrong with one number may have drawn off the others"
             )
-            warnings.append(f"{verdict}: {', '.join(names)} (see what contradicts this fit){also}")
+            warnings.append(f"{verdict}: {names} (see what contradicts this fit){also}")
     for e in estimates:
         if ran_off(problem.parameters[e.name], e.value):
             start = problem.parameters[e.name].initial
