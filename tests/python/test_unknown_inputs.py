@@ -239,6 +239,18 @@ def test_ctrl_c_while_the_size_is_sought_keeps_the_point_reached_last(steps: int
     assert "interrupted before the search: sizes and lengths of smooth priors" in fit.report()
 
 
+def test_a_wrong_drag_beside_an_unknown_force_is_named() -> None:
+    """Three times the given one. The warning named 33 modes of the force, which no table shows."""
+    values, _ = course(hung(), 0)
+    x = sb.simulate(hung(), TIMES, sb.Solver(h=1 / 2400), values=values | {"rope_drag_linear": 0.06}).positions
+    x = x + NOISE * np.random.default_rng(0).standard_normal(x.shape)
+    places, recording = [sb.on_particle(i) for i in range(11)], sb.Recording(x, TIMES, name="swing")
+    e = sb.Experiment(scene=hung(), recording=recording, markers=places, solver=SOLVER, sigma=NOISE)
+    found = sb.fit(e, parameters={"rope_EI": {"initial": 2e-3}, "rope_bend_damping": {}}, **ALONE).result
+    assert found["rope_EI"].verdict == "doubtful" and "given rope_drag_linear is too small" in found["rope_EI"].words
+    assert found.warnings[0].startswith("doubtful: rope_EI, rope_bend_damping, push (see")
+
+
 def _leaves_modes_out(result: sb.FitResult) -> None:
     """Tables of several starts and of a bootstrap, and the page, where every number has a value."""
     intervals = tuple(BootstrapInterval(name=e.name, lower=0.0, upper=1.0) for e in result.estimates)

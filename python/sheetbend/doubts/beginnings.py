@@ -237,8 +237,7 @@ def _differences(end: Whole, b: Beginning, level: float) -> Mapping[int, tuple[f
     _, _, J = b.problem.evaluate(b.u)
     if not np.isfinite(J).all():
         return {}
-    lower, upper = parameters.limits()
-    inside = [c for c in range(len(names)) if lower[c] < u[c] < upper[c] and lower[c] < b.u[c] < upper[c]]
+    inside = np.flatnonzero(parameters.inside(u) & parameters.inside(b.u)).tolist()
     determined = null_space(J[:, inside], [names[c] for c in inside], [log[c] for c in inside]).determined
     columns = tuple(inside[i] for i in determined)
     if not columns or b.problem.core.data_rows <= len(columns):

@@ -12,6 +12,7 @@ from ..arrays.types import Array
 from ..optional import require
 from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.layout import Layout
+from ..statistics.least_squares import left_by
 from .directions import LEVEL
 from .told import Told
 from .two_directions import chance_of, two_directions
@@ -78,7 +79,7 @@ class Wrong:
 
 def seen_beside(q: Array, tried: Sequence[tuple[Told, Array]]) -> list[tuple[Told, Array, Array]]:
     """The directions that parameters do not take up, each with what is left of it beside theirs, q."""
-    beside = ((one, column, column - q @ (q.T @ column)) for one, column in tried)
+    beside = ((one, column, left_by(q, column)) for one, column in tried)
     return [(one, column, b) for one, column, b in beside if float(b @ b) > RANK_TOLERANCE * float(column @ column)]
 
 
@@ -134,7 +135,7 @@ def of_noise(q: Array, white: float, cause: Cause, errors: Array | None) -> floa
     """Chance that white noise of this variance and draws of errors (data rows, draws) ask for so much of one direction.
     What else a fit leaves does not count as chance here."""
     ((_, more, column),) = cause.parts
-    beside = column - q @ (q.T @ column)
+    beside = left_by(q, column)
     inner = float(beside @ beside)
     variance = white / inner
     if errors is not None:

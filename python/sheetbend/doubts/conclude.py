@@ -87,7 +87,7 @@ def judged_parameters(
         discretization=refined,
         systematic=systematic,
         profiler=None if profiles is None else profiles.each,
-        nuisance=Nuisance(J[behind:], sum(map(problem.core.absorbed, range(len(problem.experiments))))),
+        nuisance=Nuisance(J[behind:], problem.absorbed),
         errors=driven_errors(problem, u, FEW),
         limits=impossible_ahead(problem, u, r, J),
         fixes=_beyond_scenes(problem),
@@ -161,7 +161,7 @@ def misfit(problem: FitProblem, u: Array) -> Misfit:
     layout = problem.rows_layout()
     seen = layout.clocks == 0
     beyond = float(np.mean(sigma[layout.recording[seen]] ** 2 * (r[:rows][seen] ** 2 - 1.0)))
-    taken = len(problem.parameters.free) + sum(map(problem.core.absorbed, range(len(sigma))))
+    taken = len(problem.parameters.free) + problem.absorbed
     return Misfit(
         reduced_chi_square=float(r[:rows] @ r[:rows]) / max(rows - taken, 1.0),
         smallest_sigma=float(sigma.min()),
@@ -182,10 +182,12 @@ def warnings_of(
         ahead: what a step that was not taken would move (`stationary.unfinished`).
     """
     warnings, best = [], ends[0]
+    inputs = {mode: own.name for e in problem.experiments for own in e.scene.over_time.values() for mode in own.modes}
     for verdict in UNSOUND:
-        if names := [e.name for e in estimates if e.verdict == verdict]:
-            also = "" if len(names) == len(estimates) else "; an error in one value may have shifted the others"
-            warnings.append(f"{verdict}: {', '.join(names)} (see what contradicts this fit){also}")
+        if such := [e.name for e in estimates if e.verdict == verdict]:
+            names = ", ".join(dict.fromkeys(inputs.get(name.partition("[")[0], name) for name in such))
+            also = "" if len(such) == len(estimates) else "; an error in one value may have shifted the others"
+            warnings.append(f"{verdict}: {names} (see what contradicts this fit){also}")
     for e in estimates:
         if ran_off(problem.parameters[e.name], e.value):
             start = problem.parameters[e.name].initial

@@ -101,17 +101,13 @@ def _between(
     _, r, J = problem.evaluate(u)
     rows, names = problem.core.data_rows, problem.parameters.free
     estimates = {e.name: e for e in judged.estimates}
-    lower, upper = problem.parameters.bounds()
-    used = [
-        column
-        for column, name in enumerate(names)
-        if estimates[name].verdict not in UNSOUND and lower[column] < u[column] < upper[column]
-    ]
+    inside = problem.parameters.inside(u)
+    used = [column for column, name in enumerate(names) if estimates[name].verdict not in UNSOUND and inside[column]]
     if not used or not np.isfinite(J[:, used]).all() or float(r[:rows] @ r[:rows]) < NOISELESS * rows:
         return {}
     layout, within = problem.rows_layout(), _private(problem, J[:rows, used])
     known = np.column_stack(shifts) if shifts else None
-    taken = sum(map(problem.core.absorbed, range(len(problem.experiments))))
+    taken = problem.absorbed
     free = problem.with_states(u)
     every = splits(problem, J[:rows, used], free)
     J = J[:, used]

@@ -19,7 +19,7 @@ from ..statistics.blocks import short_of_frames
 from ..statistics.covariance import covariance
 from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.layout import Layout
-from ..statistics.least_squares import spanned
+from ..statistics.least_squares import left_by, spanned
 from ..statistics.white_noise import white_noise
 from .driven_errors import FEW, driven_errors
 
@@ -72,7 +72,7 @@ def clearly(
     """
     _, r, J = problem.evaluate(u)
     J = problem.parameters.inside(u) * J
-    layout, taken = problem.rows_layout(), sum(map(problem.core.absorbed, range(len(problem.experiments))))
+    layout, taken = problem.rows_layout(), problem.absorbed
     column = np.where(mine, column, 0.0)
 
     def clear(J: Array) -> Asked | None:
@@ -81,15 +81,17 @@ def clearly(
 
     if (asked := clear(J)) is None:
         return None
-    if changed := shifts():
-        columns = np.column_stack(changed)
-        J = np.hstack([J, np.vstack([columns, np.zeros((len(r) - len(columns), columns.shape[1]))])])
-        if (asked := clear(J)) is None:
-            return None
+    if (changed := shifts()) and (asked := clear(with_changes(J, np.column_stack(changed)))) is None:
+        return None
     errors = driven_errors(problem, u, FEW)
     if errors.size:
         asked = asked_for(r, J, column, mine, layout, taken, errors)
     return asked if asked is not None and asked.chance < LEVEL / tests else None
+
+
+def with_changes(J: Array, changes: Array) -> Array:
+    """A Jacobian (rows + others, p) with changes of the data's residuals (rows, n) as further columns."""
+    return np.hstack([J, np.vstack([changes, np.zeros((len(J) - len(changes), changes.shape[1]))])])
 
 
 def asked_for(
@@ -125,7 +127,7 @@ def score(
     `asked_for`. What the residuals hold of the columns of J is no noise, and does not count as chance."""
     taken_up = spanned(J)
     rank = taken_up.shape[1]
-    beside, r = (each - taken_up @ (taken_up.T @ each) for each in (column, r))
+    beside, r = (left_by(taken_up, each) for each in (column, r))
     inner = float(beside @ beside)
     if not inner > RANK_TOLERANCE * float(column @ column) or len(layout.frame) - taken <= rank + 1:
         return None
@@ -144,9 +146,9 @@ def chance_of_drop(problem: FitProblem, u: Array, after: Array, mine: Array, dro
         drop: positive.
     """
     _, r, J = problem.evaluate(u)
-    layout, taken = problem.rows_layout(), sum(map(problem.core.absorbed, range(len(problem.experiments))))
+    layout, taken = problem.rows_layout(), problem.absorbed
     taken_up, column = spanned(J), np.where(mine, after - r, 0.0)
-    beside, rank = column - taken_up @ (taken_up.T @ column), taken_up.shape[1]
+    beside, rank = left_by(taken_up, column), taken_up.shape[1]
     inner = float(beside @ beside)
     if not inner > 0.0 or len(layout.frame) - taken <= rank + 1:
         return 1.0

@@ -23,7 +23,7 @@ from ..minimum.problem import FitProblem
 from ..statistics.least_squares import solved, unexplained
 from .causes import ALIKE, BY_CHANCE, MOST, MOST_NAMED, Wrong
 from .contradictions import residual_shifts
-from .directions import Score, noise_in, rows_of, score
+from .directions import Score, noise_in, rows_of, score, with_changes
 from .driven_errors import FEW, driven_errors, driven_span
 from .told import Told
 from .told_words import words_of
@@ -64,7 +64,7 @@ def lost_beside_contacts(
         return None
     shifts = residual_shifts(problem, u, Refinement(finer=None if refinement is None else refinement.finer))
     known = np.column_stack([*shifts, driven_span(problem, u)])
-    beside = np.hstack([J, np.vstack([known, np.zeros((len(r) - data, known.shape[1]))])])
+    beside = with_changes(J, known)
     asked_again = [each for each in losses if each[0].label in alone]
     found = sorted(clear(asked_again, beside, _errors_beside(problem, u, known)), key=lambda each: -each[2].gain)
     if not found:

@@ -31,6 +31,7 @@ from ..statistics.covariance import covariance
 from ..statistics.gauge import RANK_TOLERANCE, null_space
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of
+from ..statistics.least_squares import left_by, spanned
 from .contradictions import value_words
 from .directions import EXPLAINS, LEVEL, noise_in
 from .tangents import tangents
@@ -98,9 +99,8 @@ def freed(problem: FitProblem, u: Array) -> Freed | None:
     count, flying = len(problem.experiments), [_flies(e) for e in problem.experiments]
     blocks = [slice(first[i], first[i + 1]) for i in range(count)]
     has = np.array([J[block].any(axis=0) for block in blocks])
-    lower, upper = problem.parameters.bounds()
     single = has.sum(axis=0) == 1 if count > 1 else np.zeros(len(u), dtype=bool)
-    shared = np.flatnonzero(has.any(axis=0) & ~single & (lower < u) & (u < upper))
+    shared = np.flatnonzero(has.any(axis=0) & ~single & problem.parameters.inside(u))
     columns, after, solved, own = J[:, shared] / np.linalg.norm(J[:, shared], axis=0), r.copy(), [], 0
     for i, block in enumerate(blocks):
         private = J[block][:, has[i] & single]
@@ -110,11 +110,10 @@ def freed(problem: FitProblem, u: Array) -> Freed | None:
             return None
         if not np.isfinite(made).all():
             return None
-        basis = _basis(made)
+        basis = spanned(made)
         solved.append(made)
         own += basis.shape[1]
-        columns[block] -= basis @ (basis.T @ columns[block])
-        after[block] -= basis @ (basis.T @ after[block])
+        columns[block], after[block] = left_by(basis, columns[block]), left_by(basis, after[block])
     told = np.linalg.norm(columns, axis=0) > RANK_TOLERANCE
     null = null_space(columns[:, told], [""] * int(told.sum()), [False] * int(told.sum()))
     kept = np.flatnonzero(told)[[c for c in range(int(told.sum())) if c not in null.pivots]]
@@ -150,10 +149,3 @@ def freed(problem: FitProblem, u: Array) -> Freed | None:
 def _flies(e: Experiment) -> bool:
     """Whether an experiment is a motion that nothing holds."""
     return not (e.static or e.scene.pinned or e.scene.boundary.driven)
-
-
-def _basis(columns: Array) -> Array:
-    """Orthonormal, of what columns span."""
-    size = np.linalg.norm(columns, axis=0)
-    basis, values, _ = np.linalg.svd(columns[:, size > 0] / size[size > 0], full_matrices=False)
-    return np.asarray(basis[:, values > RANK_TOLERANCE * values.max(initial=0.0)])

@@ -29,7 +29,7 @@ from ..experiment.experiment import Experiment
 from ..minimum.optimizers import refit
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
-from ..statistics.least_squares import solved, spanned
+from ..statistics.least_squares import left_by, solved, spanned
 from .absent_bounce import SIZES as BOUNCES
 from .absent_bounce import has_no_bounce, with_bounce, with_free_bounce
 from .absent_damping import FRAMES, undamped, with_damping, with_free_damping
@@ -191,7 +191,7 @@ def _yields(problem: FitProblem, u: Array, J: Array, groups: list[_Group]) -> It
 def _promises(more: FitProblem, u: Array, q: Array, groups: list[_Group]) -> bool:
     """Whether residuals would be much less where parameters take up what they can to first order, q (rows, rank)."""
     ok, r, _ = more.evaluate(u, jacobian=False)
-    return ok and any(_less(group, r - q @ (q.T @ r)) > PROMISED for group in groups)
+    return ok and any(_less(group, left_by(q, r)) > PROMISED for group in groups)
 
 
 def _of_sizes(

@@ -18,7 +18,7 @@ from ..minimum.problem import FitProblem
 from ..optional import require
 from ..quantities.wording import short
 from ..recording.recording import Recording
-from ..statistics.least_squares import spanned
+from ..statistics.least_squares import left_by, spanned
 from .told import Told
 
 FEWEST = 16  # frames
@@ -46,7 +46,7 @@ def smoothed(problem: FitProblem, u: Array, i: int) -> list[Told]:
     own = slice(first, first + len(frames) * len(axes))
     mine = J[own]
     q = spanned(mine[:, mine.any(axis=0)])  # parameters of other motions have zeros
-    left = r[own] - q @ (q.T @ r[own])
+    left = left_by(q, r[own])
     found = []
     for label, says, filters in (
         ("cut-off", _cut_off, _low_passes(recording)),
@@ -55,7 +55,7 @@ def smoothed(problem: FitProblem, u: Array, i: int) -> list[Told]:
         best, most = None, 0.0
         for size, smooth in filters:
             column = ((smooth(shown) - shown)[frames, seen] / e.sigma).ravel()
-            beside = column - q @ (q.T @ column)
+            beside = left_by(q, column)
             along, inner = float(beside @ left), float(beside @ beside)
             if along < 0.0 and along**2 > most * inner:
                 most, best = along**2 / inner, column / size

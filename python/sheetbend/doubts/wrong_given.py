@@ -31,9 +31,10 @@ from ..result.estimate import UNSOUND
 from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of
+from ..statistics.least_squares import left_by
 from .causes import MOST, Cause, Wrong, beyond_chance, causes, of_noise, of_what_is_left, seen_beside
 from .contradictions import residual_shifts, value_words
-from .directions import EXPLAINS, noise_in, rows_of, tied
+from .directions import EXPLAINS, noise_in, rows_of, tied, with_changes
 from .driven_errors import FEW, driven_errors, driven_span
 from .followed import followed
 from .held_losses import held_names
@@ -76,8 +77,6 @@ def wrong_given(
     Noise of what drives a scene hides a wrong number. So where much is left of a motion and no number explains nearly
     all of it, they are asked for what no other driven motion explains (`driven_span`).
     """
-    if isinstance(problem.core, Lifted):
-        return _of_unbroken(problem, u, refinement)
     ok, r, J = problem.evaluate_exactly(u)
     if not ok or not np.isfinite(J).all():
         return []
@@ -128,13 +127,16 @@ def wrong_in_either(
     refinement: Refinement | None = None,
 ) -> list[Wrong]:
     """`wrong_given` in the limit of short substeps, and as it was fitted for motions of which much is left and no
-    number is named there: a limit that takes differences of two runs has tangents that contacts spoil first.
+    number is named there: a limit that takes differences of two runs has tangents that contacts spoil first. Of motions
+    that were shot in windows, their unbroken ones are asked (`unbroken`).
 
     Args:
         at: the problem and its minimum in that limit.
         fitted: both before.
         told: `told_numbers` in the limit.
     """
+    if isinstance(at[0].core, Lifted):
+        return _of_unbroken(*at, refinement)
     found = wrong_given(*at, told, refinement)
     sure = {one.motions for one in found if one.sure}
     if at[0] is fitted[0] or (len(sure) == len(found) and not _much_left(*at, sure)):
@@ -162,17 +164,17 @@ def _asked(
     """The same, with known errors of the residuals (rows, errors) of any size taken out, and changes of what drives the
     scenes (rows, changes). These may have moved the parameters, too."""
     layout, data, count = problem.rows_layout(), problem.core.data_rows, J.shape[1]
-    taken = sum(map(problem.core.absorbed, range(len(problem.experiments))))
+    taken = problem.absorbed
     for more in (known, driven):
         if more is not None:
-            J = np.hstack([J, np.vstack([more, np.zeros((len(r) - data, more.shape[1]))])])
+            J = with_changes(J, more)
     size = np.linalg.norm(J, axis=0)
     scale = np.where(size > 0.0, size, 1.0)
     q, sizes, right = np.linalg.svd(J / scale, full_matrices=False)
     kept = sizes > RANK_TOLERANCE * sizes.max(initial=0.0)
     q, inverse = q[:, kept], right[kept].T / sizes[kept] / scale[:, None]
     there = np.zeros(count) if driven is None else (-inverse @ (q.T @ r))[:count]
-    r = r - q @ (q.T @ r)
+    r = left_by(q, r)
     errors = cache(partial(driven_errors, problem, u, FEW))
     found, groups = [], tied(problem, still=True)
 

@@ -213,7 +213,7 @@ class _Predicted:
         size = np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny)
         full = np.concatenate([errors, np.zeros((len(prior), DRAWS))])
         left = errors - (data / size) @ np.linalg.lstsq(J / size, full, rcond=1e-9)[0]
-        absorbed = sum(map(problem.core.absorbed, range(len(problem.experiments))))
+        absorbed = problem.absorbed
         return [
             judged(
                 problem.parameters,

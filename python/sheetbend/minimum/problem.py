@@ -264,6 +264,11 @@ class FitProblem(OnTheWay):
         return 0.5 * float(r @ r) if ok else np.inf
 
     @property
+    def absorbed(self) -> float:
+        """Degrees of freedom of the data's residuals that corrections and states of windows take."""
+        return sum(map(self.core.absorbed, range(len(self.experiments))))
+
+    @property
     def failure(self) -> str:
         """Why the last evaluation was not ok."""
         return (self._spread or self.core).failure or "a residual is not finite"

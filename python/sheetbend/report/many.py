@@ -26,7 +26,7 @@ from .tables import Section, plain_section
 FORMAT = "sheetbend many 2"
 SHARES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 LABELS = [f"{100 * share:g} %" for share in SHARES]
-FAR = 2.0  # times the median misfit: such recordings are named
+FAR, LEAST = 2.0, 0.1  # times the median misfit, and sigma: recordings with more than both are named
 MUCH = 1.7  # sigma, the median misfit above which a warning says that the model misses most recordings
 NAMED = 5
 
@@ -100,8 +100,18 @@ class ManyFit:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What speaks against the fit as a whole."""
+        """What speaks against the fit: recordings that it misses by far, or, where there are none, all of them."""
         most = float(np.median(self.misfit))
+        far = sorted(zip(self.misfit, self.recordings, strict=True), reverse=True)
+        far = [(x, name) for x, name in far if x > max(FAR * most, LEAST)]
+        if far:
+            names = ", ".join(f"{name} ({short(x, 3)} sigma)" for x, name in far[:NAMED])
+            more = f" and {len(far) - NAMED} more" if len(far) > NAMED else ""
+            return (
+                f"{len(far)} of {len(self.misfit)} recordings are missed by more than {FAR:g} times the median of "
+                f"{short(most, 3)} sigma: {names}{more}. Check their markers, axes, units and clocks, and leave out "
+                "those that cannot be mended",
+            )
         if not most > MUCH:
             return ()
         return (
@@ -184,11 +194,6 @@ class ManyFit:
         open_ones = [(e.name, e.words) for e in self.estimates if e.verdict not in ("identified", "weak")]
         own = [(p.name, *(short(x) for x in _spread(p.values)), p.unit, _typical(p)) for p in self.own]
         misfit = ("misfit", *(short(x, 3) for x in np.quantile(self.misfit, SHARES)), "sigma", "")
-        far = sorted(zip(self.misfit, self.recordings, strict=True), reverse=True)
-        far = [(x, name) for x, name in far if x > FAR * float(np.median(self.misfit))]
-        missed = [(name, f"its misfit is {short(x, 3)} sigma") for x, name in far[:NAMED]]
-        if len(far) > NAMED:
-            missed.append(("and", f"{len(far) - NAMED} further recordings above {FAR:g} times the median"))
         end = "converged" if self.converged else "did NOT converge"
         course = (
             ("fit", f"{end} after {self.iterations} iterations, {self.seconds:.3g} s"),
@@ -201,7 +206,7 @@ class ManyFit:
         each = ("of each recording", *LABELS, "unit", "its own half-width")
         return [
             Section("Shared parameters", headers, tuple(shared), (*notes, *open_ones)),
-            Section("Recordings (shares that lie below)", each, (*own, misfit), tuple(missed)),
+            Section("Recordings (shares that lie below)", each, (*own, misfit)),
             Section("Course", notes=course),
         ]
 

@@ -32,6 +32,11 @@ def spanned(columns: Array) -> Array:
     return np.asarray(basis[:, sizes > RANK_TOLERANCE * sizes.max(initial=0.0)])
 
 
+def left_by(basis: Array, wanted: Array) -> Array:
+    """What an orthonormal basis (rows, rank), such as that of `spanned`, leaves of `wanted`, in its shape."""
+    return np.asarray(wanted - basis @ (basis.T @ wanted))
+
+
 def _scaled(columns: Array) -> tuple[Array, Array]:
     """Columns of unit length, and (p,) how long they were; a column of zeros stays."""
     size = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.types import Array
-from .gauge import RANK_TOLERANCE
 from .layout import Layout
+from .least_squares import left_by, spanned
 
 
 @dataclass(frozen=True)
@@ -93,11 +93,8 @@ class Linearized:
             others = self.rows + np.flatnonzero(self.jacobian[self.rows :, own_columns].any(axis=1))
             mine = np.append(np.arange(self.rows)[part], others)
             own = self.jacobian[np.ix_(mine, own_columns)]
-            size = np.linalg.norm(own, axis=0)
-            basis, values, _ = np.linalg.svd(own[:, size > 0] / size[size > 0], full_matrices=False)
-            basis = basis[:, values > RANK_TOLERANCE * values.max(initial=0.0)]
-            every[mine] -= basis @ (basis.T @ every[mine])
-            residuals[mine] -= basis @ (basis.T @ residuals[mine])
+            basis = spanned(own)
+            every[mine], residuals[mine] = left_by(basis, every[mine]), left_by(basis, residuals[mine])
         every, errors = np.split(every, [every.shape[1] - errors.shape[1]], axis=1)
         return every, residuals, errors, shifts
 
