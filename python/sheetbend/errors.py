@@ -7,7 +7,6 @@ import reprlib
 from collections.abc import Collection
 
 
-
 class _Short(reprlib.Repr):
     """Values as messages show them."""
 

@@ -149,6 +149,7 @@ def drawn(seed: int) -> Drawn:
         aside, high = rng.uniform(-0.004, 0.004, n), rng.uniform(0.02, 0.05, n)
         middle = np.column_stack([0.065 * np.arange(n) - 0.06, aside, high])
         along = 0.013 * (rng.uniform(-0.4, 0.4, (n, 3)) + np.array([1, 0, 0]))
+        along *= np.maximum(1.0, 0.0101 / np.linalg.norm(along, axis=1, keepdims=True))  # own balls do not overlap
         x = np.concatenate([middle - along, middle + along])
         apart = np.tile(rng.uniform(-1, 1, (n, 3)) - np.outer(np.arange(n), [2, 0, 0]), (2, 1))
         ids = scene.add_particles(x, rng.uniform(0.01, 0.1, 2 * n), thrown(rng, 2 * n) + apart)
