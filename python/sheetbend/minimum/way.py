@@ -48,7 +48,7 @@ class Settings:
         if not is_number(self.tolerance) or not 0 < self.tolerance < 1:
             raise InputError("tolerance", "must lie between 0 and 1", self.tolerance, "give a relative change of cost")
         if self.progress is not None and not callable(self.progress):
-            raise InputError("progress", "is no function", self.progress, "give one, or leave it out")
+            raise InputError("progress", "is not a function", self.progress, "give one, or leave it out")
         if isinstance(self.windows, str):
             if self.windows != AUTO:
                 raise InputError("windows", "are unknown", self.windows, "give lengths in s, [] for none, or 'auto'")
