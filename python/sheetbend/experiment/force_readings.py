@@ -122,7 +122,7 @@ def readings_problem(
 
 
 def read_at(
-    times: ArrayLike, at: tuple[str, str] | Sequence[int], quaternions: ArrayLike | None, **sensor: Any
+    times: ArrayLike, at: tuple[str, str] | Sequence[int] | Body, quaternions: ArrayLike | None, **sensor: Any
 ) -> ForceSensor:
     """A sensor that reads all forces and torques at some times, with sigma 1.
 

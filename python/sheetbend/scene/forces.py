@@ -142,7 +142,8 @@ class Forces:
             for at, weight in by[knot]
         ]
         self._varied = [
-            (nodes, share, between(before, shape, self.times), *more) for nodes, share, shape, *more in self._varied
+            (nodes, share, between(before, shape, self.times), names, factors)
+            for nodes, share, shape, names, factors in self._varied
         ]
 
     def terms(self) -> list[Term]:
