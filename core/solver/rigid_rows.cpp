@@ -12,12 +12,12 @@ namespace sheetbend {
 namespace {
 
 constexpr int at_row = sheetbend_blocks::row;
-constexpr double gives_way = 1e-6;       // D of a row that does, of J W J^T
-constexpr double body_gives_way = 1e-4;  // of a row at a body
-constexpr double softening = 1e-5;       // S, of J diag(K)^-1 J^T
-constexpr std::size_t few = 256;         // rows whose order is kept, as a border of H does (condensed.h)
-constexpr double far_less = 10.0;        // ratio of shares from which a row is exchanged
-constexpr double no_stiffness = 1e150;   // a of a member that has been taken out: products with zero stay zero
+constexpr double gives_way = 1e-10;     // D of a row that does, of J W J^T
+constexpr double stiff_joint = 1e-4;    // likewise of a joint of bodies, whose block has multipliers anyway
+constexpr double softening = 1e-5;      // S, of J diag(K)^-1 J^T
+constexpr std::size_t few = 256;        // rows whose order is kept, as a border of H does (condensed.h)
+constexpr double far_less = 10.0;       // ratio of shares from which a row is exchanged
+constexpr double no_stiffness = 1e150;  // a of a member that has been taken out: products with zero stay zero
 
 // A member's numbers as its kind wants them.
 struct Numbered : AnyConstraint<double> {
@@ -42,21 +42,14 @@ int kind_of_bodies() {
   return kind;
 }
 
-std::vector<char> nodes_of_bodies(const Scene& scene) {
-  std::vector<char> found(scene.role.size(), 0);
-  for (const Body& body : scene.bodies) {
-    found[body.center] = 1;
-    for (const int axis : body.axes) found[axis] = 1;
-  }
-  return found;
-}
-
 }  // namespace
 
 void RigidRows::find(const Scene& scene, const Given& given, const double* at) {
   *this = {};
   Numbered own;
-  const std::vector<char> of_body = nodes_of_bodies(scene);
+  std::vector<char> axis(scene.nodes(), 0);  // of a body
+  for (const Body& body : scene.bodies)
+    for (const int node : body.axes) axis[node] = 1;
   for (int r = 0; r < static_cast<int>(given.block.runs.size()); ++r) {
     const MemberRun& run = given.block.runs[r];
     const Group& group = scene.groups[run.group];
@@ -69,19 +62,16 @@ void RigidRows::find(const Scene& scene, const Given& given, const double* at) {
       const double g = group.damped ? values[lane_at(i, count, 1)] : 0.0;
       own.take(group.kind, run, values, group.damped, i, at);
       own.evaluate(group.kind, own.p);
-      double stiffest = 0.0;  // J W J^T of what has inertia: frames that settle are as light as one likes
-      bool at_body = false;
+      double stiffest = 0.0;  // J W J^T
       for (int j = 0; j < group.rows; ++j) {
         double sum = 0.0;
-        for (int d = 0; d < dofs; ++d) {
-          const int node = given.block.particles[run.nodes[lane_at(i, group.arity, d / 3)] / at_row];
-          if (!scene.inertial[node]) continue;
-          sum += own.w[d / 3] * own.J[j * dofs + d] * own.J[j * dofs + d];
-          at_body = at_body || of_body[node];
-        }
+        for (int d = 0; d < dofs; ++d) sum += own.w[d / 3] * own.J[j * dofs + d] * own.J[j * dofs + d];
         stiffest = std::max(stiffest, sum);
       }
-      if (a != 0.0 && !(a <= (at_body ? body_gives_way : gives_way) * (1.0 + g) * stiffest)) continue;
+      bool joint = false;
+      for (int k = 0; k < group.arity; ++k)
+        joint |= axis[given.block.particles[run.nodes[lane_at(i, group.arity, k)] / at_row]] != 0;
+      if (a != 0.0 && !(a <= (joint ? stiff_joint : gives_way) * (1.0 + g) * stiffest)) continue;
       members_.push_back({group.kind, r, i, run.first_row[i], group.rows, 0, group.arity, group.damped});
       for (int j = 0; j < group.rows; ++j) {
         a_.push_back(a);

@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..experiment.force_readings import read_at, readings_problem
 from ..motion.core_terms import divergence
 from ..motion.solver import Solver
+from ..scene.body import Body
 from ..scene.scene import Scene
 from .compiled import not_traced
 from .inputs import dtype_of
@@ -25,7 +26,7 @@ from .inputs import dtype_of
 def forces(
     scene: Scene,
     times: ArrayLike,
-    at: tuple[str, str] | Sequence[int],
+    at: tuple[str, str] | Sequence[int] | Body,
     solver: Solver | None = None,
     values: Mapping[str, Tensor | float] | None = None,
     *,
