@@ -129,6 +129,8 @@ def run(*arguments: object) -> Result:
 
 
 def test_the_better_model_is_told_in_words(fits: Path) -> None:
+    fitted = fits / "right" / "out" / "fitted.toml"
+    fitted.write_text(fitted.read_text().replace("[parameters.rope_EI]\n", "[parameters.rope_EI]\nfiner = 0.0021\n"))
     done = run(fits / "right" / "out", fits / "vacuum" / "out", "--output", fits / "compared", "--json")
     assert done.exit_code == 0, done.stderr
     told = json.loads(done.stdout)
@@ -136,6 +138,7 @@ def test_the_better_model_is_told_in_words(fits: Path) -> None:
     found = told["others"][other]
     assert found["paired"]["ratio"] > 2.0 and 1e3 * found["paired"]["first"] < 2.0
     assert found["settings"]["scene.rope[0].drag_linear"] == [0.03, None]
+    assert not [key for key in found["settings"] if "finer" in key]  # what a fit found is no setting
     text = " ".join((fits / "compared" / "compare.txt").read_text().split())
     assert "times that of right/out, and larger in 100% of the frames" in text and "one independent stretch" in text
     assert "rope_drag_linear is fitted in" in text

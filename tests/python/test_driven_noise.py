@@ -3,6 +3,7 @@ where nothing does."""
 
 from __future__ import annotations
 
+import re
 import signal
 from dataclasses import replace
 from pathlib import Path
@@ -317,6 +318,16 @@ def test_a_fit_that_takes_noise_for_motion_says_so():
     assert "noise of its driven markers (0.29 mm" in warning and "set driven_sigma" in warning
     clean = sb.fit(shaken(13, driven=1e-5, frames=61, driven_sigma=None), parameters=WANTED, profiles=False)
     assert not clean.result.warnings
+
+
+def test_a_warning_of_several_recordings_names_them_once():
+    both = [shaken(seed, frames=31, driven_sigma=None) for seed in (13, 14)]
+    for e in both:
+        e.recording.metadata["mended"] = ["no rate is told"]
+    assumed, noise = sb.fit(both, parameters=WANTED, profiles=False, refine=False).result.warnings
+    assert assumed == "rope13, rope14: no rate is told"
+    worst, other = re.fullmatch(r"(rope1.): noise of its .*; it counts in (rope1.) too\. .*", noise).groups()
+    assert {worst, other} == {"rope13", "rope14"}
 
 
 def test_what_noise_moves_is_what_it_moves():

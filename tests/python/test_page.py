@@ -269,6 +269,15 @@ class TestCommands:
         (motion,) = data_of((tmp_path / "a.html").read_text())["motions"]
         assert motion["frames"] == 5 and len(motion["markers"]) == 2
 
+    def test_what_hangs_along_y_is_drawn_upright(self, tmp_path: Path) -> None:
+        hanging = np.linspace([0, 1, 0], [0, 0.2, 0], 5) + 1e-3 * np.random.default_rng(1).standard_normal((20, 5, 3))
+        for gravity, up in ((None, [0, 1, 0]), ((0, 0, -9.81), [0, 0, 1])):
+            sb.Recording(hanging, np.arange(20) / 10, gravity=gravity).save(tmp_path / "a.npz")
+            page = tmp_path / "a.html"
+            assert CliRunner().invoke(app, ["view", str(tmp_path / "a.npz"), "--output", str(page)]).exit_code == 0
+            assert data_of(page.read_text())["motions"][0]["up"] == up
+            assert ("y, a guess" in page.read_text()) == (gravity is None)
+
     def test_views_of_a_recording_and_of_its_configuration_are_two_files(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:

@@ -112,7 +112,7 @@ def _verdicts(first: Written, other: Written) -> str:
 def _differences(first: Written, other: Written) -> list[tuple[str, Any, Any]]:
     a, b = first.settings, other.settings
     keys = [k for k in dict.fromkeys([*a, *b]) if a.get(k) != b.get(k)]
-    return [(k, a.get(k), b.get(k)) for k in keys if not k.endswith((".initial", ".file"))]
+    return [(k, a.get(k), b.get(k)) for k in keys if not k.endswith((".initial", ".file")) and ".finer" not in k]
 
 
 def _model(fits: Sequence[Written]) -> list[Section]:

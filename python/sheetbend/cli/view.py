@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -9,11 +10,13 @@ import typer
 from rich.console import Console
 
 from ..config import load
-from ..errors import ConfigError
+from ..errors import ConfigError, RecordingError
 from ..files.door import reading
 from ..files.whole import write_text
+from ..look import seen
 from ..optional import require
 from ..page import Shown, motion_page, of_recording, of_trajectory
+from ..recording.cloud import Cloud
 from ..recording.recording import Recording
 from ..version import __version__
 from .folders import made
@@ -64,6 +67,9 @@ def _view(console: Console, file: Path, output: Path | None, units: str | None) 
         with options(units="--units"):
             recording = Recording.load(file, units)
         name, about = recording.name, recording.summary()
+        if (upright := _upright(recording)) is not None:
+            recording, axis = upright
+            about += f"\n  up        {axis}, a guess. If another axis is, give `gravity` in {file.stem}.json"
     else:
         name, about = study.config.experiment.name, study.config.experiment.about
     page = output if output is not None else Path("out") / f"{name}{'_simulated' if simulated else ''}.html"
@@ -81,3 +87,15 @@ def _view(console: Console, file: Path, output: Path | None, units: str | None) 
     write_text(page, motion_page(motions, name, about, __version__))
     console.print(f"written to {page}", soft_wrap=True)
     return Outcome({"name": name, "page": str(page), "motions": [m.name for m in motions]})
+
+
+def _upright(recording: Recording) -> tuple[Recording, str] | None:
+    """A recording that does not tell gravity, with gravity along the axis that `sheetbend new` takes as vertical; None
+    where it tells, or no guess can be made."""
+    if recording.gravity is not None or isinstance(recording, Cloud):
+        return None
+    try:
+        found = seen(recording)
+    except RecordingError:
+        return None
+    return replace(recording, gravity=found.gravity), "xyz"[found.up]

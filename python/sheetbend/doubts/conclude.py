@@ -15,7 +15,7 @@ from ..minimum.problem import FitProblem
 from ..minimum.progress import Minimum
 from ..minimum.smooth import modes_over_time
 from ..quantities.parameters import Parameters
-from ..quantities.wording import short
+from ..quantities.wording import several, short
 from ..result.estimate import UNSOUND, Estimate
 from ..result.result import Misfit
 from ..statistics.identifiability import Identifiability, identify
@@ -193,7 +193,11 @@ def warnings_of(
             start = problem.parameters[e.name].initial
             where = f"{short(start or 0.0)} to {short(e.value)} {e.unit}".rstrip()
             warnings.append(f"{e.name} ran off from {where}, and the others were fitted with it there")
-    warnings += [f"{e.name}: {words}" for e in problem.experiments for words in e.recording.mends]
+    mends: dict[str, list[str]] = {}
+    for experiment in problem.experiments:
+        for words in experiment.recording.mends:
+            mends.setdefault(words, []).append(experiment.name)
+    warnings += [f"{several(names)}: {words}" for words, names in mends.items()]
     if best.cost == 0.0:
         warnings.append("the residuals are exactly zero, so the intervals have no width and say nothing about errors")
     if best.converged and best.doubt:

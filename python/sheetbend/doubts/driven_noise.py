@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arrays.types import Array
 from ..minimum.problem import FitProblem
-from ..quantities.wording import short
+from ..quantities.wording import several, short
 from ..result.estimate import Estimate
 from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.identifiability import Identifiability
@@ -96,21 +96,34 @@ def driven_doubts(problem: FitProblem, u: Array, judged: Identifiability) -> tup
     """What a reader must know of driven markers.
 
     Returns:
-        Warnings: `driven_noises` in words where they harm, and where a correction and its prior disagree. And by
-        parameter, that noise draws the fit off by more than its interval allows for.
+        Warnings: `driven_noises` in words where they harm, the worst with the names of the others, and where a
+        correction and its prior disagree. And by parameter, that noise draws the fit off by more than its interval
+        allows for.
     """
     found, off = driven_noises(problem, u)
     harm = [one for one in found if one.harms]
-    worst = max(harm, key=lambda one: one.moved / max(one.residual, np.finfo(float).tiny), default=None)
+    worst = max(harm, key=_share, default=None)
     doubted = {} if worst is None else _doubted(problem, worst, off, judged.estimates)
     wide = [e.name for e in judged.estimates if e.statistical is not None and e.driven > e.statistical]
-    more = f", of which it is the larger part for {', '.join(wide)}" if wide else ""
+    more = f", of which it is the larger part for {several(wide)}" if wide else ""
+    alike: dict[str, list[DrivenNoise]] = {}
+    for one in sorted(harm, key=_share, reverse=True):
+        alike.setdefault(_fix(one), []).append(one)
     words = [
         f"{one.experiment}: noise of its {_what(one)} ({short(1e3 * one.noise, 2)} mm, from the recording) moves "
-        f"{_moved_words(one)} (of one coordinate). The intervals count that to first order{more}: {_fix(one)}"
-        for one in harm
+        f"{_moved_words(one)} (of one coordinate){_elsewhere(rest)}. The intervals count that to first order{more}: "
+        f"{fix}"
+        for fix, (one, *rest) in alike.items()
     ]
     return (*words, *_corrected(problem, u)), doubted
+
+
+def _share(one: DrivenNoise) -> float:
+    return one.moved / max(one.residual, np.finfo(float).tiny)
+
+
+def _elsewhere(rest: Sequence[DrivenNoise]) -> str:
+    return f"; it counts in {several([one.experiment for one in rest])} too" if rest else ""
 
 
 def _doubted(problem: FitProblem, worst: DrivenNoise, off: dict[str, float], of: Sequence[Estimate]) -> dict[str, str]:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ..arrays.checks import is_list
 from ..arrays.types import Array
 from ..errors import InputError, RecordingError
+from ..quantities.wording import several
 from ..recording.recording import Recording
 from .alike import FEWEST, alike
 from .end_links import usual_links
@@ -121,19 +122,12 @@ def _gathered(notes: Sequence[tuple[str, str]]) -> list[str]:
     of: dict[str, list[str]] = {}
     for name, what in notes:
         of.setdefault(what, []).append(name)
-    return [
-        ", ".join(names[:MOST_NAMED]) + _more(len(names)) + (what if len(names) == 1 else _of_several(what))
-        for what, names in of.items()
-    ]
+    return [several(names, MOST_NAMED) + (what if len(names) == 1 else _of_several(what)) for what, names in of.items()]
 
 
 def _of_several(what: str) -> str:
     """What is said of one recording, in the plural."""
     return what.replace(f"{LEFT_OUT}it has ", " are left out: they have ").replace(LEFT_OUT, " are left out: ")
-
-
-def _more(count: int) -> str:
-    return f" and {count - MOST_NAMED} more" if count > MOST_NAMED else ""
 
 
 def _repeated(recordings: Sequence[Recording | GrippedMotion]) -> dict[int, str]:

@@ -19,7 +19,7 @@ from .text import table
 
 FILES = (".obj", ".ply", ".stl")
 RIM = 0.03  # of the height: vertices that are so near the top are held
-SUBSTEP = 1 / 240  # s
+SUBSTEP = 0.004  # s
 COTTON = {"density": 0.15, "warp": 500.0, "shear": 50.0, "bending": 1e-5}
 DAMPING = {"membrane_damping": 5e-3, "bend_damping": 2e-2}  # s
 AIR_ALONG = 0.02  # kg/m^3

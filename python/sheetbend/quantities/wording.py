@@ -42,6 +42,11 @@ def raised(unit: str) -> str:
     return re.sub(r"\^(-?[0-9]+)(?![0-9.]*[0-9])", lambda power: power[1].translate(_RAISED), unit)
 
 
+def several(names: Sequence[str], most: int = 4) -> str:
+    """The first names of a list, and how many more there are."""
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
 def quantity(value: float, parameter: Parameter) -> str:
     """A value with its unit."""
     return f"{short(value)} {parameter.unit}".rstrip()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..quantities.wording import short
+from ..quantities.wording import several, short
 from ..result.motions import ForceFit, RecordingFit
 from ..result.result import FitData
 from .tables import Section
@@ -54,9 +54,8 @@ def forces(result: FitData) -> Section:
 
 def _seldom_seen(recording: RecordingFit) -> str:
     few = sorted((share, name) for name, share in recording.seen.items() if share < SELDOM)
-    told = ", ".join(f"{name} ({100 * share:.2g} %)" for share, name in few[:SHOWN])
-    more = f" and {len(few) - SHOWN} more" if len(few) > SHOWN else ""
-    return f"markers seen in few of the fitted frames: {told}{more}" if few else ""
+    told = several([f"{name} ({100 * share:.2g} %)" for share, name in few], SHOWN)
+    return f"markers seen in few of the fitted frames: {told}" if few else ""
 
 
 def _corrected(recording: RecordingFit) -> str:

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 
-from ..quantities.wording import short
+from ..quantities.wording import several, short
 from ..result.estimate import UNSOUND
 from ..result.motions import ForceFit, RecordingFit
 from ..result.result import FitData
@@ -14,7 +14,6 @@ from .dependence import dependences
 from .report_recordings import readable
 from .tables import Section
 
-NAMED = 4  # parameters of one verdict that are named
 STEPS = 2  # next steps at most, called next and then
 ALIKE = 1.25  # times the given noise: residuals up to there are called as large as it
 FAR = 2.0  # times the given noise: from there on, the next step is to look at the residuals
@@ -55,9 +54,7 @@ def _end(result: FitData) -> str:
 
 
 def _names(result: FitData, verdicts: Sequence[str]) -> str:
-    names = [e.name for e in result.estimates if e.verdict in verdicts]
-    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return f"{', '.join(names[:NAMED])}{more}"
+    return several([e.name for e in result.estimates if e.verdict in verdicts])
 
 
 def _noise_ratio(result: FitData) -> float:
@@ -132,7 +129,7 @@ def _before_use(result: FitData) -> Iterator[str]:
         yield f'do not use {_names(result, UNSOUND)} before you have read "What contradicts this fit"'
     worse = [name for name, r in _held_out(result).items() if r.baseline and r.held_out and r.held_out > r.baseline]
     if worse:
-        words = f"{', '.join(worse[:NAMED])} {'is' if len(worse) == 1 else 'are'} predicted worse than without physics"
+        words = f"{several(worse)} {'is' if len(worse) == 1 else 'are'} predicted worse than without physics"
         yield f"look in report.html why {words}"
     if _noise_ratio(result) > FAR:
         yield "look at where and when the residuals are large: the model lacks something there, or sigma is too small"
