@@ -81,7 +81,7 @@ def test_a_soft_rope_that_bends_between_few_markers_does_not_stretch(markers: in
 def test_the_fit_of_a_rope_of_rubber_with_an_unknown_weight(tmp_path: Path) -> None:
     """A model that does not stretch and carries nothing missed unseen motion by 153 mm of 162, and all was doubtful."""
     config, said = drafted(tmp_path)
-    assert "its free end is taken to carry a mass, which is fitted" in said
+    assert "its free end carries a mass, some" in said
     quick = "\n[fit]\nhalve_step = false\ndouble_segments = false\nprofiles = false\n"
     config.write_text(config.read_text() + quick)
     run("fit", config, "--output", tmp_path / "out")
