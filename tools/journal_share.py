@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import kills
-from sheetbend.minimum import content, journal
+from sheetbend.minimum import digests, journal
 
 
 @dataclass
@@ -91,17 +91,17 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=6)
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
-    plain, of_problem = journal.Journal, content.of_problem
+    plain, of_problem = journal.Journal, digests.of_problem
     for kind in given.kinds:
         taken = Taken()
         journal.Journal = watched(taken)  # type: ignore[misc]
-        content.of_problem = partial(taken.measured, of_problem)
+        digests.of_problem = partial(taken.measured, of_problem)
         with tempfile.TemporaryDirectory() as folder:
             kills.prepare(kind, given.seed, Path(folder))
             began, clock = time.process_time(), time.perf_counter()
             kills.fitted(kind, given.seed, Path(folder), str(Path(folder) / "journal"), given.size)
             whole, clock = time.process_time() - began, time.perf_counter() - clock
-        journal.Journal, content.of_problem = plain, of_problem  # type: ignore[misc]
+        journal.Journal, digests.of_problem = plain, of_problem  # type: ignore[misc]
         print(
             f"{kind}: {whole:.1f} s of processor time ({clock:.1f} s by the clock), the journal {taken.seconds:.3f} s, "
             f"{100 * taken.seconds / whole:.2f} %; {taken.made} evaluations, {taken.kept} kept, {taken.read} read, "

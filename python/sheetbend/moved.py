@@ -23,7 +23,7 @@ MODULES = {
     "files": "door json_file memory names typed units whole",
     "fitting": "fit fitted_motion",
     "minimum": (
-        "approach content discretization fine_meshes growth jacobian_check journal linear_step optimizers problem "
+        "approach discretization fine_meshes growth jacobian_check journal linear_step optimizers problem "
         "refuted search time_step windows"
     ),
     "motion": (

@@ -9,7 +9,7 @@ import signal
 import numpy as np
 import pytest
 import sheetbend as sb
-import sheetbend.minimum.search as search
+import sheetbend.minimum.way as way
 from pytest import approx
 from sheetbend.doubts import profiles
 from sheetbend.experiment.wanted import as_parameters
@@ -229,7 +229,7 @@ def test_ctrl_c_during_the_refits_keeps_the_converged_values(monkeypatch):
 
 def test_ctrl_c_at_a_further_start_keeps_the_first(monkeypatch):
     whole = sb.fit([swinging()], parameters=WANTED, refine=False)
-    exact, starts = search.minimize, []
+    exact, starts = way.minimize, []
 
     def second_is_interrupted(*arguments: object, **options: object) -> object:
         starts.append(arguments)
@@ -237,7 +237,7 @@ def test_ctrl_c_at_a_further_start_keeps_the_first(monkeypatch):
             raise KeyboardInterrupt
         return exact(*arguments, **options)
 
-    monkeypatch.setattr(search, "minimize", second_is_interrupted)
+    monkeypatch.setattr(way, "minimize", second_is_interrupted)
     found = sb.fit([swinging()], parameters=WANTED, starts=[{"rope_EI": 1e-2}, {"rope_EI": 1e-3}])
     assert len(starts) == 2 and [start.converged for start in found.result.starts] == [True, False]
     assert found.result.interrupted and found.values == whole.values
