@@ -61,7 +61,7 @@ GUESSED = 0.05
 """Step of Poisson's ratio and of a restitution: as losses, they are estimated rather than measured. A Poisson's ratio
 of 0.3, told as 0.45, made the E of a swinging bar 10 % too large."""
 LATER, SLOWER, LARGER = "recording delay", "frame rate", "size of the recording"
-ASIDE, DRAFT, BESIDE = "offset of the driven motion", "draft along", "offset of markers"
+ASIDE, DRAFT, BESIDE = "offset of driven motion", "draft along", "offset of markers"
 _NONE = np.zeros(0)
 
 

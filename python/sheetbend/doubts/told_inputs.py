@@ -36,7 +36,7 @@ GROUPS: Mapping[str, tuple[str, tuple[float, str]]] = {
     "marker_mass": ("kg", (MOST_EACH, f"{short(1e3 * MOST_EACH)} g each")),
 }
 """Unit ("" where it is relative) and step, as in `told.GROUPS`."""
-SIZE, FARTHER, WEIGHTS = "size of gravity", "size of the driven motion", "mass of each marker"
+SIZE, FARTHER, WEIGHTS = "size of gravity", "size of driven motion", "mass of each marker"
 LOADS, SPEED = "size of the loads", "speed at the start"
 UNNAMED = {
     "mass": "masses without a name",
