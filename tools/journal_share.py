@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import kills
-from sheetbend.minimum import digests, journal
+from sheetbend.problem import digests, journal
 
 
 @dataclass

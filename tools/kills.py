@@ -32,7 +32,7 @@ import numpy as np
 import sheetbend as sb
 from sheetbend.gripped import RopeReport, fit_rope
 from sheetbend.gripped.ladder import TILTS, TWIST
-from sheetbend.minimum import journal
+from sheetbend.problem import journal
 
 ROPES = Path(__file__).resolve().parents[1] / "experiments" / "gripped_ropes"
 WANTED = ("rope_EI", "rope_bend_damping", "rope_drag_linear")

@@ -23,9 +23,9 @@ from sheetbend.cli.app import app
 from sheetbend.doubts.profiles import Profiles
 from sheetbend.fitting import fit as fitting
 from sheetbend.fitting.conclusion import Asked
-from sheetbend.minimum.coordinates import step_limits
-from sheetbend.minimum.counts import counted
 from sheetbend.minimum.profile_path import ProfilePath
+from sheetbend.problem.coordinates import step_limits
+from sheetbend.problem.counts import counted
 from sheetbend.statistics.profile import Profile, Wanted, profile_interval
 from typer.testing import CliRunner
 

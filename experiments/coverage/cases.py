@@ -14,7 +14,7 @@ import population_cases as many
 import sheetbend as sb
 from sheetbend import textile
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from sheetbend.result.estimate import Estimate
 
 SIGMA = 3e-3  # m

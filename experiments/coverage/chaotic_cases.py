@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 import sheetbend as sb
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from sheetbend.result.estimate import Estimate
 
 TRUTH = {

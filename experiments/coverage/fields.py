@@ -24,10 +24,10 @@ import sheetbend as sb
 from coverage import OUT, lines
 from scipy.stats import binomtest
 from sheetbend.cli.cloth_figures import stiffness_panels
-from sheetbend.minimum.counts import counted
 from sheetbend.minimum.field_priors import Picture
-from sheetbend.minimum.smooth import Field
 from sheetbend.objects.stiffness_field import StiffnessField
+from sheetbend.problem.counts import counted
+from sheetbend.problem.smooth import Field
 
 SIDE, CELLS, WARP, EI, JOINTS = 0.3, 14, 20.0, 1e-3, 20
 SIZE, LENGTH = 0.3, 0.1  # of the prior that fields are drawn from

@@ -18,7 +18,7 @@ import sheetbend as sb
 from coverage import OUT, lines
 from sheetbend.config import Study, load
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from sheetbend.quantities.parameters import Parameters
 
 NEAR = 0.25

@@ -21,7 +21,7 @@ from sheetbend.doubts.prediction import compare, predicted_values
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.approach import Approach
 from sheetbend.minimum.continuity import joined, shot_motions
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from sheetbend.quantities.parameters import Parameters
 from sheetbend.result.shot import ShotMotion
 

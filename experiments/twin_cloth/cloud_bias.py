@@ -17,7 +17,7 @@ import numpy as np
 import sheetbend as sb
 from cloud import FINER_OF_DATA, FINER_OF_FIT, FITTED, NOISE, OF_DATA, OF_FIT, PIECES, TIMES, Spots, scene, shown
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 
 Array = np.ndarray
 LIMIT = 4 / 3  # from what a mesh twice as fine moves to the limit

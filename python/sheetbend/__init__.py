@@ -39,7 +39,6 @@ if TYPE_CHECKING:  # the names of `_NAMES`, for type checkers and editors
     from .mesh import TriangleMesh as TriangleMesh
     from .mesh import read_mesh as read_mesh
     from .minimum.discretization import Refinement as Refinement
-    from .minimum.smooth import Smooth as Smooth
     from .motion.balance import ForceBalance as ForceBalance
     from .motion.balance import force_balance as force_balance
     from .motion.contact_counts import ContactCounts as ContactCounts
@@ -107,6 +106,7 @@ if TYPE_CHECKING:  # the names of `_NAMES`, for type checkers and editors
     from .objects.solid_rows import Orthotropic as Orthotropic
     from .objects.tethers import add_tethers as add_tethers
     from .objects.tool import Tool as Tool
+    from .problem.smooth import Smooth as Smooth
     from .quantities.kinds import KINDS as KINDS
     from .quantities.parameters import Parameter as Parameter
     from .quantities.parameters import Parameters as Parameters
@@ -152,7 +152,7 @@ _NAMES = {
     "gripped.recipe": "fit_rope",
     "mesh": "SolidMesh TriangleMesh read_mesh",
     "minimum.discretization": "Refinement",
-    "minimum.smooth": "Smooth",
+    "problem.smooth": "Smooth",
     "motion.balance": "ForceBalance force_balance",
     "motion.contact_counts": "ContactCounts ContactMode",
     "motion.equilibrium": "Equilibrium equilibria equilibrium",

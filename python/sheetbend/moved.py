@@ -22,10 +22,7 @@ MODULES = {
     "experiment": "carried clock correction force_readings force_sensor",
     "files": "door json_file memory names typed units whole",
     "fitting": "fit fitted_motion",
-    "minimum": (
-        "approach discretization fine_meshes growth jacobian_check journal linear_step optimizers problem "
-        "refuted search time_step windows"
-    ),
+    "minimum": "approach discretization fine_meshes growth linear_step optimizers refuted search time_step windows",
     "motion": (
         "balance equilibrium extrapolation gradient_probe gradients redundancy rollout simulate solver tape values"
     ),
@@ -34,6 +31,7 @@ MODULES = {
         "rod_junction rod_shape rope sheet_bending tethers tool"
     ),
     "pictures": "drawing field_plot force_plot movie plotting strain",
+    "problem": "jacobian_check journal",
     "quantities": "kinds parameters wording",
     "recording": (
         "baseline force_recording io io.c3d io.cells io.clock io.csv io.deform io.folder io.mesh_sequence io.motive "
@@ -52,6 +50,9 @@ MODULES = {
 CONTENTS = {
     "experiment": {
         "experiment.experiment": "Experiment",
+    },
+    "problem": {
+        "problem.problem": "FitProblem",
     },
     "quantities": {
         "quantities.quantities": "FUNCTIONS ZERO_OR_MORE Quantity Term Builder term product",

@@ -18,9 +18,9 @@ from .experiment.experiment import Experiment
 from .experiment.wanted import ParameterLike, as_parameters
 from .fitting.experiments import experiments_of
 from .minimum.continuity import joined
-from .minimum.problem import FitProblem
 from .minimum.starts import drawn
 from .optional import require
+from .problem.problem import FitProblem
 from .quantities.parameters import Parameter, Parameters
 from .recording.recording import Recording
 from .scene.scene import Scene

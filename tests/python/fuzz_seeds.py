@@ -20,7 +20,7 @@ import test_motion_capture
 import test_readers
 import test_whole_fabric
 import test_written_files
-from sheetbend.minimum import journal
+from sheetbend.problem import journal
 from sheetbend.report.fit_result import FitResult
 from sheetbend.report.many import OwnParameter
 from sheetbend.result import result

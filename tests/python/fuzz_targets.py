@@ -19,7 +19,7 @@ from sheetbend.cli.gripped import load_ropes
 from sheetbend.config.fabric_tests import load_fabric_tests
 from sheetbend.files.door import reading
 from sheetbend.files.names import flaw
-from sheetbend.minimum import journal
+from sheetbend.problem import journal
 from sheetbend.scene.scene_reader import MAGIC, PREFIX, VERSION
 from sheetbend.textile import read_curves, read_outline
 

@@ -9,9 +9,9 @@ import sheetbend as sb
 from pytest import approx
 from sheetbend.doubts.stationary import from_start, no_minimum
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.progress import Minimum
 from sheetbend.minimum.search import Search
+from sheetbend.problem.problem import FitProblem
 from test_cloth_size import NAMES, NUMBERS, flag, seen
 
 

@@ -7,8 +7,8 @@ import pytest
 import sheetbend as sb
 from sheetbend.doubts.absent_friction import _bare, _turned, _with_friction, dry_frictions
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
 from sheetbend.objects.pivot import SLIP_ANGLE
+from sheetbend.problem.problem import FitProblem
 
 TIMES, SIGMA, SOLVER = np.arange(151) / 100, 3e-4, sb.Solver(h=1 / 400)
 POINTS = np.array([[0.02, 0.0, -0.1], [-0.02, 0, -0.2], [0.01, 0, -0.3], [0, 0.02, -0.35]])

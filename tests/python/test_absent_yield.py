@@ -20,7 +20,7 @@ from sheetbend.doubts.absent_yield import (
 )
 from sheetbend.doubts.other_losses import other_losses
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from sheetbend.quantities.quantities import term
 
 SIGMA, TIMES = 3e-4, np.arange(61) / 60

@@ -15,10 +15,10 @@ from sheetbend.fitting import reached
 from sheetbend.minimum.approach import Approach
 from sheetbend.minimum.growth import growths
 from sheetbend.minimum.optimizers import minimize
-from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.progress import Minimum
 from sheetbend.minimum.search import Found, Search
 from sheetbend.objects.arm import add_arm
+from sheetbend.problem.problem import FitProblem
 
 SOLVER = sb.Solver(h=1 / 400)
 

@@ -9,7 +9,7 @@ import sheetbend as sb
 from pytest import approx
 from sheetbend.doubts.contradictions import splits
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from sheetbend.statistics.blocks import Split, contradiction
 from sheetbend.statistics.layout import Layout
 from sheetbend.statistics.linearized import Linearized

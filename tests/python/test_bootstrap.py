@@ -14,7 +14,7 @@ import sheetbend as sb
 from scipy.optimize import least_squares
 from sheetbend.doubts.bootstrap import _drawn, _parts, bootstrap, check_bootstrap, wider
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 
 SIGMA = 1e-3
 TIMES = np.arange(160) / 160

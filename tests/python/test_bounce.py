@@ -11,7 +11,7 @@ from sheetbend.doubts.told import told_numbers
 from sheetbend.doubts.told_words import words_of
 from sheetbend.doubts.wrong_given import _directions
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 
 SOLVER = sb.Solver(h=1 / 480, method="implicit")
 

@@ -284,7 +284,7 @@ class TestCheck:
     def test_a_wrong_jacobian_exits_5(
         self, config: Path, monkeypatch: pytest.MonkeyPatch, wrong: Callable, static: bool
     ) -> None:
-        from sheetbend.minimum.problem import FitProblem
+        from sheetbend.problem.problem import FitProblem
 
         exact = FitProblem.evaluate
         if static:  # bent by its own weight, so that its shape depends on EI

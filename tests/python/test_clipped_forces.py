@@ -10,7 +10,7 @@ import sheetbend as sb
 import test_forces_fit as shaken
 from sheetbend.doubts.clipped import clipped
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 
 twin = shaken.twin
 

@@ -16,9 +16,9 @@ from sheetbend.cli.figures import figure_files
 from sheetbend.config import load
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.fitting.reached import Reached
-from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.search import Search
 from sheetbend.objects.stiffness_field import StiffnessField
+from sheetbend.problem.problem import FitProblem
 from support import expect_modes_scale
 
 behind = importlib.import_module("sheetbend.fitting.fit")  # the package has the function under this name

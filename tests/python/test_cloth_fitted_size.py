@@ -10,8 +10,8 @@ import sheetbend as sb
 from sheetbend.doubts.cloth_size import cloth_sizes
 from sheetbend.errors import SceneError
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
 from sheetbend.objects.flat_size import POWERS, of_edges
+from sheetbend.problem.problem import FitProblem
 
 NUMBERS: dict[str, Any] = {"density": 0.15, "warp": 150.0, "weft": 200.0, "shear": 40.0, "poisson": 0.2}
 NUMBERS |= {"membrane_damping": 5e-3, "drag_linear": 0.05, "drag_quadratic": 0.02}

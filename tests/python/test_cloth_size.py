@@ -7,7 +7,7 @@ import pytest
 import sheetbend as sb
 from sheetbend.doubts.cloth_size import cloth_sizes
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from test_wrong_given import asked
 
 TIMES = np.arange(61) / 100

@@ -11,7 +11,7 @@ from pytest import approx
 from scipy.integrate import quad
 from scipy.optimize import brentq
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from support import static_sensitivity, twice
 
 WARP, SHEAR = 1000.0, 50.0

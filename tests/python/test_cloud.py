@@ -14,7 +14,7 @@ from commands import run
 from sheetbend.config import build, parse
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.mesh.places import closest
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 
 Array = np.ndarray
 TRUE = {"cloth_warp": 100.0, "cloth_shear": 20.0, "cloth_bending": 5e-5, "cloth_drag_linear": 0.2}

@@ -14,7 +14,7 @@ import tomli_w
 from commands import run
 from sheetbend.doubts.told import told_numbers
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 
 Array = np.ndarray
 TRUE = {"rope_EI": 1e-3, "rope_drag_linear": 5e-3}

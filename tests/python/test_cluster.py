@@ -16,11 +16,11 @@ import pytest
 import sheetbend as sb
 from commands import run
 from sheetbend.errors import ConfigError, InputError
-from sheetbend.minimum import digests, workers
-from sheetbend.minimum.cluster import dask
-from sheetbend.minimum.cluster import workers as workers_of
-from sheetbend.minimum.traffic import Traffic
-from sheetbend.minimum.workers import Common, working_on
+from sheetbend.problem import digests, workers
+from sheetbend.problem.cluster import dask
+from sheetbend.problem.cluster import workers as workers_of
+from sheetbend.problem.traffic import Traffic
+from sheetbend.problem.workers import Common, working_on
 from sheetbend.report.parameter_table import TABLE
 from test_collect import ROPE
 from test_journal import swinging
@@ -161,7 +161,7 @@ def test_traffic_in_words() -> None:
 
 
 def test_no_scheduler_and_two_kinds_of_workers_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sheetbend.minimum.cluster.TIMEOUT", 0.5)
+    monkeypatch.setattr("sheetbend.problem.cluster.TIMEOUT", 0.5)
     with pytest.raises(ConfigError, match="--dask: reaches no scheduler"), dask("tcp://127.0.0.1:9"):
         pass
     with pytest.raises(ConfigError, match="names no file of a scheduler"), dask("nowhere.json"):

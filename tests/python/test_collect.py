@@ -18,7 +18,7 @@ from sheetbend.cli.fit import _single
 from sheetbend.cli.outcome import Code
 from sheetbend.cli.screen import Screen
 from sheetbend.errors import InputError
-from sheetbend.minimum.journal import Journal
+from sheetbend.problem.journal import Journal
 from sheetbend.report.collected import Collected
 from sheetbend.report.fit_result import FitResult
 from sheetbend.result.estimate import Estimate

@@ -267,7 +267,7 @@ class TestBuild:
         text = ROPE.replace("[parameters.rope_EI]", f"{second}\n[parameters.rope_EI]\nprivate = true")
         study = load(written(folder, text))
         from sheetbend.experiment.wanted import as_parameters
-        from sheetbend.minimum.problem import FitProblem
+        from sheetbend.problem.problem import FitProblem
 
         problem = FitProblem(study.experiments, as_parameters(study.parameters, study.experiments))
         values = problem.parameters.to_physical(problem.parameters.initial())

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from test_memory import net
 from test_pickling import cloth, rod, rope
 from test_scene_file import FORGED_ARRAYS, FORGED_HEADERS, PREFIX, altered, change, forged

@@ -15,9 +15,9 @@ from sheetbend.mesh import grid
 from sheetbend.minimum import discretization, time_step
 from sheetbend.minimum.linear_step import gauss_newton, moves
 from sheetbend.minimum.optimizers import minimize, refit
-from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.progress import Minimum
 from sheetbend.minimum.time_step import settle
+from sheetbend.problem.problem import FitProblem
 from sheetbend.quantities.parameters import Parameter, Parameters
 from sheetbend.result.estimate import Estimate
 

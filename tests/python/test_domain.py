@@ -119,7 +119,7 @@ def test_a_fit_refuses_such_a_start(rod: sb.Scene) -> None:
 
 def test_a_fit_does_not_step_there(rod: sb.Scene) -> None:
     from sheetbend.experiment.wanted import as_parameters
-    from sheetbend.minimum.problem import FitProblem
+    from sheetbend.problem.problem import FitProblem
 
     e = sb.Experiment(scene=rod, recording=recording(rod), solver=SOLVER)
     problem = FitProblem([e], as_parameters(["rod_density_1"], [e]))

@@ -12,7 +12,7 @@ from sheetbend.doubts.told import Told, told_numbers
 from sheetbend.doubts.told_words import words_of
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.optimizers import minimize
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 
 SOLVER, TIMES = sb.Solver(h=1 / 400), np.arange(31) / 100
 DRAFT = np.array([2e-3, -1e-3, 3e-3])  # m/s

@@ -11,7 +11,7 @@ from pytest import approx
 from sheetbend.doubts import driven_errors as module
 from sheetbend.doubts.driven_errors import _KNOWN, driven_errors
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from sheetbend.statistics.blocks import contradiction
 from sheetbend.statistics.linearized import Linearized
 from sheetbend.statistics.shared_errors import moved_by

@@ -21,10 +21,10 @@ from sheetbend.experiment.wanted import as_parameters
 from sheetbend.fitting.fitted_motion import fitted_positions
 from sheetbend.minimum.linear_step import residuals_there
 from sheetbend.minimum.optimizers import minimize
-from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.progress import Progress
 from sheetbend.minimum.search import Search
 from sheetbend.minimum.time_step import halved
+from sheetbend.problem.problem import FitProblem
 from sheetbend.statistics.identifiability import identify
 from typer.testing import CliRunner
 

@@ -15,7 +15,7 @@ from sheetbend.config import load
 from sheetbend.experiment.found_start import settled, started
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.fitting.fitted_motion import fitted_positions
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 
 Array = np.ndarray
 LENGTH, LINKS, NOISE, SOLVER = 0.6, 20, 1e-3, sb.Solver(h=1 / 240)

@@ -15,7 +15,7 @@ from sheetbend.doubts.told import GROUPS, told_numbers
 from sheetbend.doubts.told_inputs import told_inputs
 from sheetbend.experiment.force_sensor import INPUTS
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 
 Array = np.ndarray
 TIMES, SOLVER = np.arange(6) / 60, sb.Solver(h=1 / 240)

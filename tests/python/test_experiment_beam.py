@@ -15,7 +15,7 @@ from scipy import special
 from sheetbend.config import load
 from sheetbend.doubts.prediction import Comparison
 from sheetbend.fitting.fit import Fit
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from sheetbend.result.motions import RecordingFit
 from sheetbend.statistics.covariance import covariance
 

@@ -12,7 +12,7 @@ import pytest
 import sheetbend as sb
 from sheetbend.config import build, parse
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "held_cloth"
 sys.path.insert(0, str(FOLDER))

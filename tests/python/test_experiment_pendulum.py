@@ -15,7 +15,7 @@ import sheetbend as sb
 from sheetbend.config import build, parse
 from sheetbend.config.build import Study
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from sheetbend.statistics.gauge import null_space
 
 pytestmark = pytest.mark.slow

@@ -15,7 +15,7 @@ from sheetbend.config import build, parse
 from sheetbend.config.build import Study
 from sheetbend.config.values import with_values
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 
 pytestmark = pytest.mark.slow
 

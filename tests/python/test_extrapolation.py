@@ -9,9 +9,9 @@ import pytest
 import sheetbend as sb
 from pytest import approx
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
 from sheetbend.motion.extrapolation import weights
 from sheetbend.objects.arm import add_pendulum
+from sheetbend.problem.problem import FitProblem
 
 FRAMES = np.arange(5) * 0.25
 

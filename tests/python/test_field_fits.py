@@ -9,8 +9,8 @@ import pytest
 from scipy import optimize, stats
 from sheetbend.minimum.field_fits import half_widths, spread
 from sheetbend.minimum.field_priors import LENGTHS, SIZES, Picture
-from sheetbend.minimum.smooth import Field, Smooth
 from sheetbend.objects.stiffness_field import StiffnessField, modes_of
+from sheetbend.problem.smooth import Field, Smooth
 
 N = 5
 

@@ -10,9 +10,9 @@ from pytest import approx
 from sheetbend.cli.app import app
 from sheetbend.config import load
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.jacobian_check import check_jacobian
-from sheetbend.minimum.problem import FitProblem
 from sheetbend.pictures.force_plot import plot_forces
+from sheetbend.problem.jacobian_check import check_jacobian
+from sheetbend.problem.problem import FitProblem
 from sheetbend.statistics.covariance import covariance
 from sheetbend.statistics.layout import Layout
 from typer.testing import CliRunner

@@ -11,7 +11,7 @@ import pytest
 import sheetbend as sb
 from sheetbend.doubts.told import told_numbers
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from sheetbend.report.dependence import Dependence, dependences, with_dependences
 from sheetbend.report.fit_result import FitResult
 from sheetbend.result.estimate import Estimate, Premise

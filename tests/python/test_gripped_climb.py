@@ -35,9 +35,9 @@ from sheetbend.gripped.pieces import experiments_of, problem_of
 from sheetbend.gripped.search import Search
 from sheetbend.gripped.start import about, started, whole
 from sheetbend.gripped.steps import Rope
-from sheetbend.minimum.evaluator import Evaluator
 from sheetbend.minimum.optimizers import minimize
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.evaluator import Evaluator
+from sheetbend.problem.problem import FitProblem
 from test_gripped_motion import carried_about, model_of
 
 MOTION = GrippedMotion.of(carried_about(), 0.0)

@@ -9,7 +9,7 @@ from sheetbend.gripped import GrippedMotion
 from sheetbend.gripped.judging import predict
 from sheetbend.gripped.offsets import offset_reach
 from sheetbend.minimum.optimizers import minimize
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from sheetbend.quantities.parameters import Parameter, Parameters
 from test_gripped_motion import carried_about, model_of
 

@@ -12,7 +12,7 @@ from sheetbend.gripped import GrippedMotion, RopeModel
 from sheetbend.gripped import slid as slid_before
 from sheetbend.gripped.judging import predict
 from sheetbend.gripped.slid import MODES, MORE, STEPS, noise, slid, window_of
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from sheetbend.report.scores import coordinate_error
 from test_gripped_motion import carried_about, model_of, simulated
 

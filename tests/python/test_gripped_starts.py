@@ -14,8 +14,8 @@ from sheetbend.gripped.ladder import TWIST
 from sheetbend.gripped.pieces import experiments_of, problem_of
 from sheetbend.gripped.raced import points, rows
 from sheetbend.gripped.start import about, started
-from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.race import Raced, groups_of
+from sheetbend.problem.problem import FitProblem
 from test_gripped_climb import MODEL, MOTION, shown
 
 LENGTHS = (0.45, 0.25, 0.12)

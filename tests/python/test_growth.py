@@ -9,8 +9,8 @@ import pytest
 import sheetbend as sb
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.growth import ROUGH, Growth, growth, growths
-from sheetbend.minimum.problem import FitProblem
 from sheetbend.objects.arm import add_arm
+from sheetbend.problem.problem import FitProblem
 
 
 def experiment(scene: sb.Scene, end: float, h: float, **fields: object) -> sb.Experiment:

@@ -12,7 +12,7 @@ import tomli_w
 from sheetbend.config import build, parse
 from sheetbend.doubts.spin import spins_otherwise
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from sheetbend.statistics.identifiability import Identifiability
 
 Array = np.ndarray

@@ -12,7 +12,7 @@ import sheetbend as sb
 from pytest import approx
 from scipy.integrate import solve_ivp
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from sheetbend.quantities.quantities import term
 from sheetbend.report.report import plain
 from support import observed_orders

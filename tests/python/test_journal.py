@@ -19,13 +19,13 @@ import pytest
 import sheetbend as sb
 from sheetbend import _core
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum import digests, journal, journal_values
 from sheetbend.minimum.by_ceres import has_ceres
-from sheetbend.minimum.journal import Journal
 from sheetbend.minimum.optimizers import minimize
-from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.progress import Progress
 from sheetbend.minimum.time_step import halved
+from sheetbend.problem import digests, journal, journal_values
+from sheetbend.problem.journal import Journal
+from sheetbend.problem.problem import FitProblem
 
 WANTED = ("rope_EI", "rope_bend_damping")
 OPTIMIZERS = ["scipy", *(["ceres"] if has_ceres() else [])]
@@ -391,7 +391,7 @@ class TestRefusals:
             Journal(path)
 
     def test_a_journal_in_use(self, path: Path) -> None:
-        code = f"from sheetbend.minimum.journal import Journal; Journal({str(path)!r})"
+        code = f"from sheetbend.problem.journal import Journal; Journal({str(path)!r})"
         with Journal(path):
             done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
         assert "InputError" in done.stderr and "locked" in done.stderr

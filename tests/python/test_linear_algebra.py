@@ -14,11 +14,11 @@ import sheetbend as sb
 from sheetbend import optional
 from sheetbend.errors import InputError
 from sheetbend.gripped import fit_rope
-from sheetbend.minimum import linear_algebra
-from sheetbend.minimum.linear_algebra import one_blas_thread
-from sheetbend.minimum.problem import FitProblem
-from sheetbend.minimum.workers import Common, working_on
 from sheetbend.objects.fabric import Fabric
+from sheetbend.problem import linear_algebra
+from sheetbend.problem.linear_algebra import one_blas_thread
+from sheetbend.problem.problem import FitProblem
+from sheetbend.problem.workers import Common, working_on
 from sheetbend.textile import Curve, FabricTests, fit_fabric, fit_pull, fit_tests
 from test_journal import swinging
 from test_workers import Backwards
@@ -72,7 +72,7 @@ def test_a_fit_that_fails_restores_the_number(monkeypatch: pytest.MonkeyPatch, e
         assert blas_threads() == {1}
         raise error
 
-    monkeypatch.setattr(sb.minimum.problem.FitProblem, "check_start", failing)
+    monkeypatch.setattr(sb.problem.problem.FitProblem, "check_start", failing)
     with pytest.raises(type(error)):
         sb.fit(swinging(), **FITTED)
     assert blas_threads() == {HERE}
@@ -159,7 +159,7 @@ def test_a_missing_package_is_named_with_its_extra(package: str, monkeypatch: py
 SHOWN = """
 import threading
 import numpy
-from sheetbend.minimum.linear_algebra import one_blas_thread
+from sheetbend.problem.linear_algebra import one_blas_thread
 from threadpoolctl import threadpool_info
 
 def show():

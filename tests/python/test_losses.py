@@ -9,7 +9,7 @@ import pytest
 import sheetbend as sb
 from sheetbend.doubts.losses import air_doubts, loss_sum
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from sheetbend.result.estimate import Estimate
 
 TRUE = {"strip_bend_damping": 4e-3, "strip_drag_linear": 0.16}

@@ -21,8 +21,8 @@ from sheetbend.doubts.wrong_given import wrong_given
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.discretization import AUTO
 from sheetbend.minimum.optimizers import minimize
-from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.time_step import settle
+from sheetbend.problem.problem import FitProblem
 from sheetbend.statistics.layout import Layout
 from test_contact_fit import SIGMA, SOLVER, TIMES
 

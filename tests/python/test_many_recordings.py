@@ -17,11 +17,11 @@ import sheetbend as sb
 from pytest import approx
 from sheetbend.errors import InputError
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum import recordings
 from sheetbend.minimum.approach import inside
-from sheetbend.minimum.journal import Journal
 from sheetbend.minimum.many import ManyProblem
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem import recordings
+from sheetbend.problem.journal import Journal
+from sheetbend.problem.problem import FitProblem
 from test_workers import Backwards
 
 COUNT = 20

@@ -13,7 +13,7 @@ from sheetbend.doubts.implausible import implausible
 from sheetbend.doubts.misread import _better, misread
 from sheetbend.doubts.other_units import other_units
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from sheetbend.statistics.intervals import open_estimate
 
 SOLVER, SIGMA = sb.Solver(h=1 / 400), 3e-4

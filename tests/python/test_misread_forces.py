@@ -12,7 +12,7 @@ from sheetbend.doubts.misread_forces import _of, misread_forces
 from sheetbend.doubts.prediction import Comparison
 from sheetbend.doubts.unexplained import unexplained
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 
 Twin = tuple[np.ndarray, np.ndarray, sb.ForceRecording]
 

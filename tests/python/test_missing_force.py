@@ -9,7 +9,7 @@ import sheetbend as sb
 from sheetbend.doubts.missing_force import freed
 from sheetbend.doubts.tangents import tangents
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 
 POINTS = 0.05 * np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
 SIGMA, SOLVER = 1e-4, sb.Solver(h=1 / 300)

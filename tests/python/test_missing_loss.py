@@ -13,7 +13,7 @@ from sheetbend.doubts.missing_loss import missing_loss, of_more_loss
 from sheetbend.doubts.other_losses import other_losses
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.optimizers import minimize
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from test_unexplained import between_hands
 
 SIGMA = 3e-4

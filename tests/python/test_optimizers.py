@@ -16,11 +16,11 @@ from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum import by_ceres, discretization, slope
 from sheetbend.minimum.by_ceres import has_ceres
 from sheetbend.minimum.discretization import Refinement
-from sheetbend.minimum.evaluator import Evaluator
-from sheetbend.minimum.journal import Timed
 from sheetbend.minimum.optimizers import minimize
-from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.progress import Best, Minimum, Progress
+from sheetbend.problem.evaluator import Evaluator
+from sheetbend.problem.journal import Timed
+from sheetbend.problem.problem import FitProblem
 
 fitting = importlib.import_module("sheetbend.fitting.fit")  # the name in the package is the function
 

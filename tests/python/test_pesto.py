@@ -10,9 +10,9 @@ import pytest
 import sheetbend as sb
 from pytest import approx
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
 from sheetbend.optional import MissingExtraError
 from sheetbend.pesto import _Function, problem
+from sheetbend.problem.problem import FitProblem
 
 TIMES, SOLVER = np.arange(20) / 50, sb.Solver(h=0.005)
 WANTED = {"rope_EI": {}, "rope_bend_damping": {"prior": (5e-3, 1.0)}}

@@ -11,9 +11,9 @@ from sheetbend.doubts.touching import _refitted
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.approach import Approach
 from sheetbend.minimum.by_ceres import has_ceres
-from sheetbend.minimum.coordinates import Coordinates
 from sheetbend.minimum.optimizers import minimize
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.coordinates import Coordinates
+from sheetbend.problem.problem import FitProblem
 
 POINTS = 0.05 * np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
 TIMES, SOLVER, NOISE = np.arange(40) * 0.01, sb.Solver(h=5e-3), 1e-3

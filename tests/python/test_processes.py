@@ -12,7 +12,7 @@ import pytest
 
 CLIENT = """
 import os, time
-from sheetbend.minimum.cluster import processes
+from sheetbend.problem.cluster import processes
 
 def work(seconds):
     time.sleep(seconds)

@@ -14,9 +14,9 @@ from scipy.optimize import brentq, least_squares
 from sheetbend.doubts.profiles import Profiles
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.optimizers import minimize, named
-from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.profile_path import Linear, ProfilePath
 from sheetbend.objects.markers import on_particle
+from sheetbend.problem.problem import FitProblem
 from sheetbend.statistics.profile import Wanted, profile_interval
 
 T = np.linspace(0.0, 3.0, 60)

@@ -7,7 +7,7 @@ import pytest
 import sheetbend as sb
 from sheetbend.doubts.contradictions import MOST_RECORDINGS, splits
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from sheetbend.statistics.blocks import Contradiction, Split, contradiction
 from sheetbend.statistics.covariance import covariance
 from sheetbend.statistics.layout import Layout

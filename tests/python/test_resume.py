@@ -27,8 +27,8 @@ from sheetbend import cli
 from sheetbend.cli.stopping import Stopping
 from sheetbend.minimum import by_ceres
 from sheetbend.minimum.by_ceres import has_ceres
-from sheetbend.minimum.journal import Journal
 from sheetbend.minimum.progress import Progress
+from sheetbend.problem.journal import Journal
 from typer.testing import Result
 
 WRITTEN = {

@@ -12,9 +12,9 @@ import tomli_w
 from sheetbend.cli.figures import figure_files
 from sheetbend.config import load
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
-from sheetbend.minimum.smooth import with_fields
 from sheetbend.objects.stiffness_field import StiffnessField
+from sheetbend.problem.problem import FitProblem
+from sheetbend.problem.smooth import with_fields
 from support import expect_modes_scale
 
 LENGTH, NOISE = 0.4, 5e-4

@@ -15,12 +15,12 @@ from sheetbend.errors import InputError, SheetbendError
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.approach import Approach, inside
 from sheetbend.minimum.by_ceres import has_ceres
-from sheetbend.minimum.coordinates import LOG_STEP, step_limits
 from sheetbend.minimum.growth import Growth
 from sheetbend.minimum.optimizers import minimize
-from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.search import Search
 from sheetbend.minimum.windows import chosen, cut
+from sheetbend.problem.coordinates import LOG_STEP, step_limits
+from sheetbend.problem.problem import FitProblem
 from sheetbend.quantities.parameters import DEFAULT_RANGE, Parameter, Parameters
 from sheetbend.report.fit_result import FitResult
 from sheetbend.report.report import plain

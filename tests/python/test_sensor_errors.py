@@ -12,7 +12,7 @@ from sheetbend.doubts.given import premises
 from sheetbend.doubts.sensor_errors import SensorError, sensor_errors
 from sheetbend.doubts.told import told_numbers
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 
 SIGMA = 0.005  # N; torques 0.002 N m
 SAMPLES = np.arange(2, 120) * 0.01

@@ -18,13 +18,13 @@ from sheetbend.experiment.cut import borders
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum import lifted_starts
 from sheetbend.minimum.continuity import joined, with_window
-from sheetbend.minimum.journal import Journal
-from sheetbend.minimum.lifted import Lifted
-from sheetbend.minimum.lifted_window import LiftedWindow, Rows, Seen
 from sheetbend.minimum.optimizers import walked
-from sheetbend.minimum.parts import expanded_to
-from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.progress import Progress
+from sheetbend.problem.journal import Journal
+from sheetbend.problem.lifted import Lifted
+from sheetbend.problem.lifted_window import LiftedWindow, Rows, Seen
+from sheetbend.problem.parts import expanded_to
+from sheetbend.problem.problem import FitProblem
 from sheetbend.report.report_shot import shot_motions
 from sheetbend.result.shot import ShotMotion
 from sheetbend.statistics.chain import Chain, Gap, Window

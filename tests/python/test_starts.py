@@ -12,10 +12,10 @@ from sheetbend.config import load
 from sheetbend.errors import InputError
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.conditioning import Condition
-from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.progress import Progress
 from sheetbend.minimum.race import Course, Reference, race
 from sheetbend.minimum.starts import drawn, off_bounds
+from sheetbend.problem.problem import FitProblem
 from sheetbend.quantities.parameters import Parameter, Parameters
 from sheetbend.report.fit_result import FitResult
 from test_journal import bits

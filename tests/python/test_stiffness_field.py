@@ -12,9 +12,9 @@ import tomli_w
 from sheetbend.config import load
 from sheetbend.config.values import with_values, write
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
-from sheetbend.minimum.smooth import with_fields
 from sheetbend.objects.stiffness_field import StiffnessField, modes_of
+from sheetbend.problem.problem import FitProblem
+from sheetbend.problem.smooth import with_fields
 
 MESH = sb.mesh.bricks((0.1, 0.02, 0.02), (10, 2, 2))
 CLUSTERS = sb.cluster_boxes(MESH, 0.02)

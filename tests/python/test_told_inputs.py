@@ -12,7 +12,7 @@ from sheetbend.doubts.given import premises
 from sheetbend.doubts.told import Told, told_numbers
 from sheetbend.doubts.told_words import words_of
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 
 Array = np.ndarray
 SOLVER, TIMES = sb.Solver(h=1 / 300), np.arange(0, 46) / 50

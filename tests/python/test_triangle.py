@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from sheetbend.minimum.triangle import ROWS, triangle
+from sheetbend.problem.triangle import ROWS, triangle
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import numpy as np
 import sheetbend as sb
 from pytest import approx
 from sheetbend.doubts.unexplained import shares, unexplained
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 
 SIGMA = 3e-4
 

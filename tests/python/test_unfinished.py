@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import sheetbend as sb
-from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.search import Found, Search
+from sheetbend.problem.problem import FitProblem
 
 SIGMA, SOLVER, AT = 3e-4, sb.Solver(h=1 / 400), [2, 4, 6, 8]
 

@@ -19,11 +19,11 @@ from sheetbend.cli.figures import figure_files
 from sheetbend.config import load
 from sheetbend.config.values import with_values
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.progress import Progress
-from sheetbend.minimum.smooth import with_fields
 from sheetbend.objects.over_time import modes_of_times
 from sheetbend.page.of_fit import result_page
+from sheetbend.problem.problem import FitProblem
+from sheetbend.problem.smooth import with_fields
 from sheetbend.result.bootstrap import Bootstrap, BootstrapInterval
 from sheetbend.statistics.intervals import NORMAL
 

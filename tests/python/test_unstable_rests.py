@@ -8,7 +8,7 @@ import sheetbend as sb
 from sheetbend import config
 from sheetbend.doubts.unstable import unstable_rests
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "wires"
 MODES = ("black_set_1", "black_set_2", "black_set_3", "black_set_4")

@@ -15,9 +15,9 @@ from sheetbend.doubts.contradictions import elsewhere, held_out_motion
 from sheetbend.doubts.profiles import Elsewhere
 from sheetbend.doubts.stationary import no_minimum
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
 from sheetbend.minimum.progress import Minimum
 from sheetbend.objects.arm import add_arm
+from sheetbend.problem.problem import FitProblem
 from sheetbend.result.estimate import UNSOUND
 from sheetbend.statistics.identifiability import Identifiability
 

@@ -16,8 +16,8 @@ import pytest
 import sheetbend as sb
 from sheetbend.errors import InputError
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
-from sheetbend.minimum.workers import Common, working_on
+from sheetbend.problem.problem import FitProblem
+from sheetbend.problem.workers import Common, working_on
 from test_journal import TIMED, swinging
 
 PRIVATE: dict[str, Any] = {"rope_EI": {}, "rope_bend_damping": {"private": True, "prior": (0.01, 0.5)}}

@@ -12,7 +12,7 @@ from sheetbend.doubts.told import told_numbers
 from sheetbend.doubts.wrong_given import Wrong, doubts_of, explained_by, wrong_given
 from sheetbend.experiment.wanted import as_parameters
 from sheetbend.minimum.optimizers import minimize
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from test_contact_fit import SOLVER as DRAGGING
 from test_contact_fit import TIMES as DRAGGED
 from test_contact_fit import dragged

@@ -13,7 +13,7 @@ from sheetbend.doubts.told import told_numbers
 from sheetbend.doubts.told_inputs import FARTHER
 from sheetbend.doubts.wrong_given import wrong_given
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from test_contact_fit import SOLVER, TIMES, dragged
 from test_driven_errors import NOISE, START, swung
 from test_misread import SIGMA

@@ -12,7 +12,7 @@ from sheetbend.doubts.draft import drafts
 from sheetbend.doubts.tangents import tangents
 from sheetbend.doubts.told import told_numbers
 from sheetbend.experiment.wanted import as_parameters
-from sheetbend.minimum.problem import FitProblem
+from sheetbend.problem.problem import FitProblem
 from test_misread import AT, SIGMA, SOLVER, TRUE, rope, wrong_and_identified
 from test_missing_loss import shaken
 

@@ -19,12 +19,12 @@ from ..gripped.plausible import gravities
 from ..gripped.start import started, whole
 from ..gripped.windows import SPANS
 from ..minimum.growth import in_words, over_fit
-from ..minimum.jacobian_check import JacobianReport, check_jacobian
-from ..minimum.problem import FitProblem
 from ..motion.gradient_report import GradientReport
 from ..motion.gradients import check_gradients
 from ..motion.solver import Solver
 from ..objects.chain import unit_vector
+from ..problem.jacobian_check import JacobianReport, check_jacobian
+from ..problem.problem import FitProblem
 from ..quantities.parameters import Parameters
 from .gripped import RUNGS, RopeData, load_ropes
 from .outcome import Code, Json, Outcome, run

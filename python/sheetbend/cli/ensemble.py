@@ -17,7 +17,7 @@ from ..config.named_files import named_files
 from ..errors import ConfigError, InputError, SheetbendError
 from ..files.door import noting, reading
 from ..files.whole import UnwrittenError, write_text
-from ..minimum.workers import naming_losses
+from ..problem.workers import naming_losses
 from ..report.fit_result import FitResult
 from .journals import NAME
 from .outcome import Code, Outcome, code_of

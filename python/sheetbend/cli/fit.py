@@ -21,12 +21,12 @@ from ..files.door import reading
 from ..files.whole import write_text
 from ..fitting.fit import Fit
 from ..fitting.fit import fit as run_fit
-from ..minimum.cluster import workers as workers_of
 from ..minimum.discretization import FINER_MESH
-from ..minimum.journal import Journal
-from ..minimum.problem import FitProblem
-from ..minimum.workers import working_on
 from ..pictures.movie import movie_paths
+from ..problem.cluster import workers as workers_of
+from ..problem.journal import Journal
+from ..problem.problem import FitProblem
+from ..problem.workers import working_on
 from ..recording.recording import Recording
 from ..report.fit_result import FitResult
 from ..report.parameter_table import TABLE, parameter_table

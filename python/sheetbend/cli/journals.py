@@ -9,8 +9,8 @@ from pathlib import Path
 
 from ..config import Config, GrippedConfig
 from ..errors import ConfigError, InputError
-from ..minimum.digests import digest
-from ..minimum.journal import Journal, remove
+from ..problem.digests import digest
+from ..problem.journal import Journal, remove
 from ..recording.recording import Recording
 
 NAME = "journal.sqlite"

@@ -10,8 +10,8 @@ import numpy as np
 
 from .. import _core
 from ..experiment.experiment import Experiment
-from ..minimum.problem import NOTHING
 from ..motion.core_terms import divergence
+from ..problem.problem import NOTHING
 from ..recording.recording import Recording
 
 PREDICTED = "predicted_"

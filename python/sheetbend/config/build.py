@@ -12,8 +12,8 @@ from ..errors import ConfigError
 from ..experiment.experiment import Experiment
 from ..experiment.wanted import as_parameters
 from ..minimum.discretization import Refinement
-from ..minimum.smooth import Smooth, with_fields
 from ..motion.solver import Solver
+from ..problem.smooth import Smooth, with_fields
 from ..quantities.parameters import Parameters
 from ..recording.windows import check_windows
 from ..scene.scene import Scene

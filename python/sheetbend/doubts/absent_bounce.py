@@ -11,7 +11,7 @@ import copy
 from dataclasses import replace
 
 from ..experiment.experiment import Experiment
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..quantities.parameters import Parameter
 from ..quantities.quantities import Quantity, Term
 from .more_parameters import with_parameter

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arrays.types import Array
 from ..experiment.experiment import Experiment
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..quantities.parameters import Parameter
 from ..quantities.quantities import Quantity, Term
 from ..scene.group import places_of_groups

@@ -19,10 +19,10 @@ from ..arrays.types import Array
 from ..errors import SheetbendError
 from ..experiment.experiment import Experiment
 from ..experiment.found_start import start_nodes
-from ..minimum.problem import FitProblem
 from ..motion.simulate import simulate
 from ..motion.values import constraint_values
 from ..objects.pivot import SLIP_ANGLE
+from ..problem.problem import FitProblem
 from ..quantities.wording import short
 from ..scene.group import Group, GroupPlaces, places_of_groups
 from ..scene.scene import Scene

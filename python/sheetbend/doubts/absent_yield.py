@@ -18,9 +18,9 @@ from ..arrays.types import Array
 from ..errors import SheetbendError
 from ..experiment.experiment import Experiment
 from ..experiment.found_start import start_nodes
-from ..minimum.problem import FitProblem
 from ..motion.simulate import simulate
 from ..motion.values import constraint_values
+from ..problem.problem import FitProblem
 from ..quantities.kinds import KINDS
 from ..quantities.parameters import Parameter
 from ..quantities.quantities import Quantity, Term

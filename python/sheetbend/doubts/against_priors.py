@@ -16,9 +16,9 @@ import math
 import numpy as np
 
 from ..arrays.types import Array
-from ..minimum.problem import FitProblem
-from ..minimum.smooth import modes_of_fields
 from ..optional import require
+from ..problem.problem import FitProblem
+from ..problem.smooth import modes_of_fields
 from ..quantities.parameters import Parameter
 from ..quantities.wording import short
 from ..statistics.identifiability import Identifiability

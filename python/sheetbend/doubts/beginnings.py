@@ -29,12 +29,12 @@ from ..errors import SheetbendError
 from ..minimum.discretization import Refinement
 from ..minimum.growth import Growth
 from ..minimum.linear_step import one_step
-from ..minimum.problem import FitProblem
 from ..minimum.progress import Minimum
 from ..minimum.search import Search, fitted_window
 from ..minimum.time_step import SECOND_ORDER
 from ..minimum.windows import chosen, cut
 from ..optional import require
+from ..problem.problem import FitProblem
 from ..quantities.wording import short
 from ..statistics.blocks import FEWEST, LEVEL, short_of_frames
 from ..statistics.covariance import Covariance, covariance

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from ..arrays.types import Array
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..quantities.wording import short
 from ..result.estimate import Estimate
 from ..statistics.identifiability import Identifiability

@@ -20,8 +20,8 @@ from ..arrays.checks import MOST_WHOLE, check_count
 from ..arrays.types import Array
 from ..errors import InputError
 from ..minimum.linear_step import gauss_newton
-from ..minimum.problem import FitProblem
-from ..minimum.workers import Common
+from ..problem.problem import FitProblem
+from ..problem.workers import Common
 from ..quantities.parameters import Parameters
 from ..quantities.wording import short
 from ..result.bootstrap import Bootstrap, BootstrapInterval

@@ -15,8 +15,8 @@ import numpy as np
 
 from ..arrays.types import Array
 from ..errors import SheetbendError
-from ..minimum.problem import FitProblem
 from ..optional import require
+from ..problem.problem import FitProblem
 from ..quantities.wording import short
 from ..statistics.least_squares import solved
 from ..statistics.white_noise import white_variance

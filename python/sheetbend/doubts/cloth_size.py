@@ -16,8 +16,8 @@ import numpy as np
 from ..arrays.types import Array
 from ..errors import SceneError, SheetbendError
 from ..mesh import TriangleMesh
-from ..minimum.problem import FitProblem
 from ..objects.cloth import Cloth, add_cloth
+from ..problem.problem import FitProblem
 from ..quantities.wording import short
 from ..scene.group import OF_CONSTRAINTS, places_of_groups
 from ..scene.scene import Scene

@@ -11,9 +11,9 @@ from ..arrays.types import Array
 from ..experiment.wanted import quantities_of
 from ..minimum.growth import Growth
 from ..minimum.linear_step import gauss_newton
-from ..minimum.problem import FitProblem
 from ..minimum.progress import Minimum
-from ..minimum.smooth import modes_over_time
+from ..problem.problem import FitProblem
+from ..problem.smooth import modes_over_time
 from ..quantities.parameters import Parameters
 from ..quantities.wording import several, short
 from ..result.estimate import UNSOUND, Estimate

@@ -13,9 +13,9 @@ from ..arrays.types import Array
 from ..experiment.cut import start_quantities
 from ..experiment.experiment import Experiment
 from ..minimum.discretization import Refinement
-from ..minimum.lifted import WithStates
-from ..minimum.problem import FitProblem
 from ..minimum.time_step import SECOND_ORDER, halved
+from ..problem.lifted import WithStates
+from ..problem.problem import FitProblem
 from ..quantities.parameters import Parameter
 from ..quantities.wording import figures, short
 from ..result.estimate import UNSOUND, Estimate

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays.types import Array
-from ..minimum.problem import FitProblem
 from ..optional import require
+from ..problem.problem import FitProblem
 from ..statistics.blocks import short_of_frames
 from ..statistics.covariance import covariance
 from ..statistics.gauge import RANK_TOLERANCE

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays.types import Array
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from .tangents import Input
 
 

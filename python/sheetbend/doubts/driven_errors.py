@@ -30,7 +30,7 @@ import numpy as np
 from ..arrays.timeseries import interpolate, noise, off_neighbors
 from ..arrays.types import Array
 from ..experiment.experiment import Experiment
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..scene.boundary import Following
 from ..statistics.least_squares import spanned
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays.types import Array
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..quantities.wording import several, short
 from ..result.estimate import Estimate
 from ..statistics.gauge import RANK_TOLERANCE

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..arrays.types import Array
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..quantities.expression import numbers
 from ..scene.bodies import names_of
 from ..scene.body import AXES, GROUND, Body

@@ -14,7 +14,7 @@ import numpy as np
 from ..arrays.types import Array
 from ..errors import SheetbendError
 from ..minimum.optimizers import refit
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..quantities.parameters import Parameter
 from ..quantities.quantities import Quantity, Term
 from .causes import MOST, Wrong

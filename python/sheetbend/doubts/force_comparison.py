@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays.types import Array
 from ..experiment.experiment import Experiment
 from ..experiment.force_sensor import CHANNELS
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..result.motions import ForceFit
 
 UNITS = (("N", slice(0, 3)), ("N m", slice(3, CHANNELS)))

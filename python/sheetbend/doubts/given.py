@@ -16,7 +16,7 @@ import numpy as np
 from ..arrays.checks import check_kind, is_number
 from ..arrays.types import Array
 from ..errors import InputError
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..result.estimate import Premise
 from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.intervals import NORMAL

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..arrays.types import Array
 from ..experiment.wanted import quantities_of
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..quantities.parameters import Parameter, Parameters
 from ..quantities.wording import short
 from .directions import Asked, clearly, rows_of, tied

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from ..experiment.experiment import Experiment
 from ..experiment.wanted import quantities_of
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..quantities.parameters import Parameters
 from ..quantities.wording import short
 from ..scene.scene import Scene

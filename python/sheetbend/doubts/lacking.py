@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import cache, partial
 
 from ..arrays.types import Array
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from .clipped import clipped
 from .cloth_size import cloth_sizes
 from .losses_at_zero import touches

@@ -8,8 +8,8 @@ from dataclasses import replace
 from ..errors import InputError
 from ..experiment.experiment import Experiment
 from ..minimum.optimizers import refit
-from ..minimum.problem import FitProblem
-from ..minimum.workers import Common
+from ..problem.problem import FitProblem
+from ..problem.workers import Common
 from ..quantities.parameters import Parameters
 from .prediction import Comparison, compare, predicted_values
 

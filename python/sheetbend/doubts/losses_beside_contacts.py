@@ -19,7 +19,7 @@ import numpy as np
 
 from ..arrays.types import Array
 from ..minimum.discretization import Refinement
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..statistics.least_squares import solved, unexplained
 from .causes import ALIKE, BY_CHANCE, MOST, MOST_NAMED, Wrong
 from .contradictions import residual_shifts

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays.types import Array
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..quantities.wording import short
 from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.layout import Integers

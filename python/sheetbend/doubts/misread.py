@@ -18,8 +18,8 @@ from ..arrays.timeseries import mean_position
 from ..arrays.types import Array
 from ..errors import SheetbendError
 from ..experiment.experiment import Experiment
-from ..minimum.problem import FitProblem
 from ..optional import require
+from ..problem.problem import FitProblem
 from ..quantities.wording import short
 
 Mask = NDArray[np.bool_]

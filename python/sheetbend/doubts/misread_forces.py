@@ -15,7 +15,7 @@ import numpy as np
 from ..arrays.types import Array
 from ..errors import SheetbendError
 from ..experiment.force_sensor import ForceSensor
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..quantities.wording import short
 
 KINDS = (("forces", slice(0, 3), "N"), ("torques", slice(3, 6), "N m"))

@@ -22,8 +22,8 @@ import numpy as np
 from ..arrays.types import Array
 from ..errors import SheetbendError
 from ..experiment.experiment import Experiment
-from ..minimum.problem import FitProblem
 from ..optional import require
+from ..problem.problem import FitProblem
 from ..quantities.wording import short
 from ..result.estimate import UNSOUND
 from ..statistics.blocks import short_of_frames

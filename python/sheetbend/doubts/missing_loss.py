@@ -27,7 +27,7 @@ import numpy as np
 from ..arrays.types import Array
 from ..experiment.cut import in_steps
 from ..minimum.discretization import Refinement
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..quantities.wording import short
 from .contradictions import residual_shifts
 from .directions import Asked, clearly, rows_of, tied

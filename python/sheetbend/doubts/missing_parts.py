@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arrays.types import Array
 from ..experiment.experiment import Experiment
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..quantities.wording import short
 from ..scene.group import places_of_groups
 from .losses_at_zero import losses_at_zero, with_losses

@@ -27,7 +27,7 @@ from ..errors import SheetbendError
 from ..experiment.cut import in_steps
 from ..experiment.experiment import Experiment
 from ..minimum.optimizers import refit
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..quantities.wording import short
 from ..statistics.least_squares import left_by, solved, spanned
 from .absent_bounce import SIZES as BOUNCES

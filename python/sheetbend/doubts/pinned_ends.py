@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.types import Array
-from ..minimum.problem import FitProblem
 from ..objects.cloth import Cloth
+from ..problem.problem import FitProblem
 from ..quantities.wording import short
 from ..scene.scene import Scene
 from .tangents import Part

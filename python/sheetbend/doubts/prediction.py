@@ -13,8 +13,8 @@ from ..experiment.carried import carried_baselines
 from ..experiment.driven_motion import continued
 from ..experiment.experiment import Experiment
 from ..minimum.optimizers import refit
-from ..minimum.problem import FitProblem
-from ..minimum.smooth import modes_over_time
+from ..problem.problem import FitProblem
+from ..problem.smooth import modes_over_time
 from ..quantities.parameters import Parameters
 from ..recording.baseline import baseline
 from ..recording.oscillation import along, dominant_direction, first_frequency

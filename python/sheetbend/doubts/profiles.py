@@ -12,12 +12,12 @@ import numpy as np
 
 from ..arrays.types import Array
 from ..errors import SheetbendError
-from ..minimum.coordinates import step_limits
-from ..minimum.counts import count, counted
 from ..minimum.optimizers import refit
-from ..minimum.problem import FitProblem
 from ..minimum.profile_path import Linear, ProfilePath
-from ..minimum.workers import Common, current
+from ..problem.coordinates import step_limits
+from ..problem.counts import count, counted
+from ..problem.problem import FitProblem
+from ..problem.workers import Common, current
 from ..statistics.least_squares import solved
 from ..statistics.profile import NOISELESS, Ends, Profile, Wanted, profile_interval
 

@@ -16,7 +16,7 @@ import numpy as np
 from ..arrays.types import Array
 from ..experiment.cut import start_quantities
 from ..minimum.growth import Growth
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..quantities.parameters import Parameter
 from ..quantities.wording import short
 

@@ -16,7 +16,7 @@ import numpy as np
 from ..arrays.types import Array
 from ..errors import SheetbendError
 from ..experiment.force_sensor import ForceSensor
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..quantities.wording import short
 from .told_inputs import turned
 

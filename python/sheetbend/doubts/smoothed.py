@@ -14,8 +14,8 @@ import numpy as np
 
 from ..arrays.types import Array
 from ..errors import SheetbendError
-from ..minimum.problem import FitProblem
 from ..optional import require
+from ..problem.problem import FitProblem
 from ..quantities.wording import short
 from ..recording.recording import Recording
 from ..statistics.least_squares import left_by, spanned

@@ -17,8 +17,8 @@ import numpy as np
 from ..arrays.types import Array
 from ..errors import SheetbendError
 from ..experiment.experiment import Experiment
-from ..minimum.problem import FitProblem
 from ..objects.rod import Rod
+from ..problem.problem import FitProblem
 from ..quantities.wording import short
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of

@@ -9,10 +9,10 @@ import numpy as np
 from ..arrays.types import Array
 from ..errors import SheetbendError
 from ..minimum.linear_step import gauss_newton
-from ..minimum.problem import FitProblem
 from ..minimum.progress import Minimum
 from ..minimum.search import Search
 from ..minimum.slope import ROUNDING, promised
+from ..problem.problem import FitProblem
 from ..quantities.wording import short
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of

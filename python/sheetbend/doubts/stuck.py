@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays.types import Array
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..quantities.wording import quantity, side_words
 from ..result.estimate import Estimate
 from ..statistics.identifiability import Identifiability

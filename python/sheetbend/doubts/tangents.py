@@ -11,7 +11,7 @@ from .. import _core
 from ..arrays.types import Array
 from ..errors import SheetbendError
 from ..experiment.experiment import Experiment
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..quantities.quantities import Term
 
 Input = tuple[str, np.ndarray, np.ndarray]

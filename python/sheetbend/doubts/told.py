@@ -17,9 +17,9 @@ from .. import _core
 from ..arrays.types import Array
 from ..errors import SheetbendError
 from ..experiment.experiment import Experiment
-from ..minimum.problem import FitProblem
 from ..motion.core_terms import divergence
 from ..objects.markers import Place
+from ..problem.problem import FitProblem
 from ..quantities.quantities import Quantity
 from ..recording.recording import Recording
 from ..scene.air import WIND

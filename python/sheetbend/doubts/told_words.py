@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..quantities.wording import short
 from .told import ASIDE, BESIDE, DRAFT, LARGER, LATER, SLOWER, Told
 from .told_inputs import DEGREE, FARTHER, LOADS, MILLIMETER, SIZE, SPEED, UNNAMED

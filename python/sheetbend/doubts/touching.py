@@ -14,10 +14,10 @@ import numpy as np
 
 from ..arrays.types import Array
 from ..errors import DivergenceError, SceneError, UnbalancedError
-from ..minimum.problem import FitProblem
 from ..motion.contact_counts import ContactMode
 from ..motion.depth import too_deep
 from ..motion.simulate import Trajectory, simulate
+from ..problem.problem import FitProblem
 from ..result.estimate import Estimate
 from ..result.motions import ContactFit, Kinks
 from ..scene.scene import Scene

@@ -16,7 +16,7 @@ from ..minimum.approach import Approach
 from ..minimum.discretization import Refinement
 from ..minimum.growth import growths
 from ..minimum.optimizers import WALK, WALK_PROMISE
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from .roughness import rough_parameters
 
 

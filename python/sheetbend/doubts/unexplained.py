@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from ..arrays.timeseries import mean_position
 from ..arrays.types import Array
 from ..experiment.carried import Values, carried_baselines
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..quantities.wording import short
 from ..statistics.white_noise import white_variance
 from .force_comparison import UNITS

@@ -13,7 +13,7 @@ import numpy as np
 from ..arrays.types import Array
 from ..errors import SheetbendError
 from ..minimum.linear_step import gauss_newton
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..quantities.wording import short
 
 AHEAD = 0.01  # of the step that the search would take next: so far ahead the edge is looked for

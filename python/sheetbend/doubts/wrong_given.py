@@ -24,8 +24,8 @@ import numpy as np
 
 from ..arrays.types import Array
 from ..minimum.discretization import Refinement
-from ..minimum.lifted import Lifted
-from ..minimum.problem import FitProblem
+from ..problem.lifted import Lifted
+from ..problem.problem import FitProblem
 from ..quantities.wording import short
 from ..result.estimate import UNSOUND
 from ..statistics.gauge import RANK_TOLERANCE

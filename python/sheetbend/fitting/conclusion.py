@@ -30,8 +30,8 @@ from ..doubts.wrong_given import doubts_of, explained_by, wrong_in_either
 from ..doubts.wrong_given import warnings_of as wrong_given_warnings
 from ..experiment.experiment import Experiment
 from ..minimum.discretization import Refinement, settled, to_the_limit, wanted_refinement
-from ..minimum.problem import FitProblem
 from ..minimum.time_step import Settled
+from ..problem.problem import FitProblem
 from ..quantities.parameters import Parameters
 from ..result.bootstrap import Bootstrap
 from ..result.estimate import Given, Premise

@@ -22,14 +22,14 @@ from ..minimum.by_ceres import ceres_trouble
 from ..minimum.continuity import joined
 from ..minimum.discretization import Refinement, wanted_refinement
 from ..minimum.field_priors import with_likely_priors
-from ..minimum.journal import journaled
-from ..minimum.linear_algebra import one_blas_thread
 from ..minimum.progress import Observer
 from ..minimum.search import Search
-from ..minimum.smooth import Smooth, with_fields
-from ..minimum.sought import Sought
-from ..minimum.workers import shared_out
 from ..optional import require
+from ..problem.journal import journaled
+from ..problem.linear_algebra import one_blas_thread
+from ..problem.smooth import Smooth, with_fields
+from ..problem.sought import Sought
+from ..problem.workers import shared_out
 from ..quantities.parameters import Parameter, Parameters
 from ..recording.recording import Recording
 from ..report.fit_result import FitResult
@@ -189,7 +189,7 @@ def fit(
         max_iterations: largest number of iterations, for each start and window.
         threads: threads for experiments and columns of the Jacobian; the result does not depend on it.
         progress: function that is called after every iteration.
-        journal: file that keeps every evaluation until the fit is done (see `sheetbend.minimum.journal`). If the
+        journal: file that keeps every evaluation until the fit is done (see `sheetbend.problem.journal`). If the
             process is killed, the same call with the same file continues and gives the same bits. With another
             recording, scene or version the file is refused.
         executor: its workers compute experiments, raced starts, profiles, bootstraps and leave-one-out fits, for

@@ -24,11 +24,11 @@ from ..errors import InputError, SheetbendError
 from ..experiment.experiment import Experiment
 from ..experiment.wanted import ParameterLike, as_parameters
 from ..minimum.growth import growths, in_words
-from ..minimum.linear_algebra import one_blas_thread
-from ..minimum.problem import FitProblem
-from ..minimum.smooth import Field, Smooth, with_fields
 from ..objects.over_time import OverTime
 from ..optional import require
+from ..problem.linear_algebra import one_blas_thread
+from ..problem.problem import FitProblem
+from ..problem.smooth import Field, Smooth, with_fields
 from ..quantities.parameters import Parameters
 from ..recording.recording import Recording
 from ..result.estimate import Estimate

@@ -16,13 +16,13 @@ from ..errors import InputError, SheetbendError
 from ..experiment.experiment import Experiment
 from ..experiment.wanted import ParameterLike, as_parameters
 from ..minimum.arrow import Arrow, reduced
-from ..minimum.counts import counted
-from ..minimum.journal import journaled
-from ..minimum.linear_algebra import one_blas_thread
 from ..minimum.many import ManyApproach, ManyProblem
 from ..minimum.progress import Progress
-from ..minimum.workers import shared_out
 from ..optional import require
+from ..problem.counts import counted
+from ..problem.journal import journaled
+from ..problem.linear_algebra import one_blas_thread
+from ..problem.workers import shared_out
 from ..quantities.parameters import Parameter, Parameters
 from ..report.many import ManyFit, OwnParameter
 from ..result.estimate import Estimate

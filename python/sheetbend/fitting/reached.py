@@ -15,10 +15,10 @@ from ..doubts.beginnings import Beginning, checked, many
 from ..doubts.conclude import without_verdict
 from ..doubts.stationary import from_start
 from ..minimum.growth import Growth, growths
-from ..minimum.problem import FitProblem
 from ..minimum.progress import Minimum
 from ..minimum.search import Found, Search
 from ..minimum.way import NEAR_TOLERANCE
+from ..problem.problem import FitProblem
 from ..result.estimate import Estimate
 
 

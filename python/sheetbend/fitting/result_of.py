@@ -23,10 +23,10 @@ from ..doubts.unexplained import unexplained
 from ..experiment.clock import outside, told_clocks
 from ..experiment.found_start import start_moved
 from ..minimum.continuity import shot_motions
-from ..minimum.counts import counted
 from ..minimum.field_fits import Fields
 from ..minimum.fine_meshes import at_the_limit
-from ..minimum.smooth import Field
+from ..problem.counts import counted
+from ..problem.smooth import Field
 from ..report.dependence import with_dependences
 from ..report.fit_result import FitResult
 from ..result.motions import ContactFit, RecordingFit

@@ -11,8 +11,8 @@ import numpy as np
 from ..errors import InputError
 from ..experiment.experiment import Experiment
 from ..experiment.force_sensor import ForceSensor
-from ..minimum.smooth import modes_over_time
 from ..objects.markers import Place, on_rope
+from ..problem.smooth import modes_over_time
 from ..quantities.parameters import Parameters
 from ..recording.force_recording import ForceRecording
 from ..recording.recording import Recording

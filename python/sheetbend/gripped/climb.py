@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import SheetbendError
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..result.result import Start
 from .beside import Offsets, beside, frames_of, offsets_found
 from .carried import carry

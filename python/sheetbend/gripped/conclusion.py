@@ -16,7 +16,7 @@ from ..errors import SheetbendError
 from ..experiment.experiment import Experiment
 from ..fitting.fit import Fit, fit
 from ..minimum.discretization import Refinement
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..quantities.parameters import Parameter
 from ..quantities.wording import short
 from .bounds import bounded

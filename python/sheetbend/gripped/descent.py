@@ -14,8 +14,8 @@ import numpy as np
 
 from ..arrays.types import Array
 from ..minimum.approach import Approach
-from ..minimum.problem import FitProblem
 from ..minimum.slope import ROUNDING, STUCK
+from ..problem.problem import FitProblem
 from .model import NAME
 
 DISTANCE = 0.1  # standard deviations to the minimum, of a parameter, at which a descent has ended

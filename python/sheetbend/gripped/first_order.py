@@ -14,8 +14,8 @@ import numpy as np
 
 from ..arrays.types import Array
 from ..minimum.approach import RIDGE, inside
-from ..minimum.coordinates import step_limits
-from ..minimum.problem import FitProblem
+from ..problem.coordinates import step_limits
+from ..problem.problem import FitProblem
 from .judging import Errors, Split, Verdict, verdict
 from .model import RopeModel
 from .pieces import numbered, problem_of

@@ -14,10 +14,10 @@ import numpy as np
 
 from ..arrays.types import Array
 from ..experiment.experiment import Experiment
-from ..minimum.problem import FitProblem
 from ..motion.simulate import simulate
 from ..objects.markers import Place
 from ..objects.rod import Rod
+from ..problem.problem import FitProblem
 from ..recording.recording import Recording
 from ..statistics.intervals import critical_t
 from .model import NAME

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..experiment.experiment import Experiment
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..quantities.parameters import Parameter, Parameters
 from .model import RopeModel
 from .motion import GrippedMotion

@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays.types import Array
-from ..minimum.problem import FitProblem
 from ..minimum.race import Course, Raced, race
 from ..minimum.starts import drawn, off_bounds
+from ..problem.problem import FitProblem
 from ..quantities.parameters import Parameter, Parameters
 from ..result.result import Start
 from .descent import Descent

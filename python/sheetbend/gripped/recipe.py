@@ -20,10 +20,10 @@ from ..arrays.checks import is_list, is_number
 from ..arrays.types import Array
 from ..errors import InputError
 from ..fitting.fit import Fit
-from ..minimum.journal import journaled
-from ..minimum.linear_algebra import one_blas_thread
 from ..minimum.starts import check_count
 from ..objects.chain import unit_vector
+from ..problem.journal import journaled
+from ..problem.linear_algebra import one_blas_thread
 from ..recording.recording import Recording
 from .bounds import at_bounds
 from .climb import Climb

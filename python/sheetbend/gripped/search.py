@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import SheetbendError
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from .bounds import bounded
 from .carried import slopes_of
 from .descent import Descent, bearable, descend

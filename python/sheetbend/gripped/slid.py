@@ -19,7 +19,7 @@ import numpy as np
 from ..arrays.smoothing import FEWEST
 from ..arrays.types import Array
 from ..experiment.experiment import Experiment
-from ..minimum.problem import FitProblem
+from ..problem.problem import FitProblem
 from ..quantities.parameters import Parameter, Parameters
 from ..recording.windows import Window
 from .model import NAME, RopeModel

@@ -1,1 +1,1 @@
-"""From a least-squares problem to its minimum: optimizers, searches, windows, journals, limits of refinement."""
+"""From a least-squares problem to its minimum, and what finer discretizations would change there."""

@@ -19,10 +19,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..arrays.types import Array
+from ..problem.coordinates import Coordinates
+from ..problem.counts import counted
+from ..problem.triangle import triangle
 from ..quantities.parameters import Parameters
-from .coordinates import Coordinates
-from .counts import counted
-from .triangle import triangle
 
 RIDGE = 1e-3  # of the cost: what a parameter's longest step must promise to be worth taking
 GOOD, POOR = 0.75, 0.25  # of the decrease that the linear model promises

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays.types import Array
+from ..problem.triangle import padded
 from ..statistics.gauge import RANK_TOLERANCE
 from .approach import inside
-from .triangle import padded
 
 PASSES = 8  # of a step, each holding own numbers at the sides that they have met
 

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from .coordinates import Coordinates
-from .counts import count
+from ..problem.coordinates import Coordinates
+from ..problem.counts import count
+from ..problem.problem import FitProblem
 from .geometric import GeometricSteps
-from .problem import FitProblem
 from .progress import Best, Minimum
 
 

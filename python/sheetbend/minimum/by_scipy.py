@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from ..optional import require
-from .counts import counted
-from .problem import FitProblem
+from ..problem.counts import counted
+from ..problem.problem import FitProblem
 from .progress import Best, Minimum
 
 

@@ -17,15 +17,15 @@ from ..errors import InputError
 from ..experiment.cut import LEAST_FRAMES, LEAST_STEPS, borders, cut, shot
 from ..experiment.experiment import Experiment
 from ..experiment.shooting import AUTO, Shooting
+from ..problem.journal import leave
+from ..problem.lifted import Lifted
+from ..problem.parts import expanded_to
+from ..problem.problem import FitProblem
 from ..quantities.parameters import Parameters
 from ..result.shot import ShotMotion
 from .growth import over_fit
-from .journal import leave
-from .lifted import Lifted
 from .lifted_starts import begun
 from .optimizers import walked
-from .parts import expanded_to
-from .problem import FitProblem
 from .progress import Latest, Observer
 from .window_loss import loss
 

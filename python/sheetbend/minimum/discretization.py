@@ -18,13 +18,13 @@ import numpy as np
 
 from ..errors import InputError, SheetbendError
 from ..experiment.experiment import Experiment
+from ..problem.problem import FitProblem
 from ..quantities.parameters import Parameters
 from ..result.result import Refit
 from ..statistics.profile import FARTHEST
 from .fine_meshes import left_open, two_steps
 from .linear_step import gauss_newton, moves, one_step, residuals_there
 from .optimizers import refit
-from .problem import FitProblem
 from .progress import Minimum
 from .refuted import refuted, words
 from .time_step import SECOND_ORDER, SWEEPS, TIME_STEP, Settled, combined, settle

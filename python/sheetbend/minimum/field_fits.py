@@ -16,12 +16,12 @@ import numpy as np
 from ..arrays.types import Array
 from ..objects.over_time import OverTime
 from ..objects.stiffness_field import StiffnessField
+from ..problem.problem import FitProblem
+from ..problem.smooth import Field, Modes
 from ..result.field import FieldFit
 from ..result.over_time import OverTimeFit
 from ..statistics.intervals import LEVEL
 from .field_priors import Picture
-from .problem import FitProblem
-from .smooth import Field, Modes
 
 HALVINGS = 40  # of the range of half-widths
 FINEST = 0.1  # of the modes

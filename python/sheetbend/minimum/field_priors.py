@@ -14,16 +14,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays.types import Array
+from ..problem.parts import expanded_to
+from ..problem.problem import FitProblem
+from ..problem.smooth import Field
+from ..problem.sought import Sought
 from ..quantities.parameters import Parameters
 from ..statistics.intervals import LIKELY
 from ..statistics.spectral import effective_deviation
 from .growth import growths
 from .optimizers import walked
-from .parts import expanded_to
-from .problem import FitProblem
 from .progress import Latest, Observer
-from .smooth import Field
-from .sought import Sought
 from .windows import chosen, through
 
 SIZES, LENGTHS = (1e-3, 10.0), (0.1, 10.0)  # that are looked at; lengths of the shortest wave's and of the extent

@@ -15,12 +15,12 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays.types import Array
+from ..problem.problem import FitProblem
 from ..quantities.parameters import Parameters
 from ..result.estimate import Estimate
 from ..result.result import Refit
 from ..statistics.profile import FARTHEST
 from .linear_step import gauss_newton, moves, one_step
-from .problem import FitProblem
 
 ORDER = 1 / 12  # of the shift: what an order between 1.7 and 2.4 leaves open
 COARSE = 0.3  # of a value, or of its scale: a shift as large as this is no small correction

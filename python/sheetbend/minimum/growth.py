@@ -24,9 +24,9 @@ from ..experiment.cut import shot, start_quantities
 from ..experiment.experiment import Experiment
 from ..motion.equilibrium import equilibrium
 from ..motion.solver import Solver
+from ..problem.lifted import Lifted
+from ..problem.problem import FitProblem
 from ..scene.scene import Scene
-from .lifted import Lifted
-from .problem import FitProblem
 
 ROUGH = 1e4
 """Growth above which nothing is derived from a Jacobian. Measured: a flag in the wind that is fitted to 1e-10 has 255,

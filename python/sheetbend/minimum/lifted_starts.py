@@ -13,12 +13,12 @@ from ..arrays.types import Array
 from ..experiment.cut import borders, shot, start_quantities
 from ..experiment.experiment import Experiment
 from ..optional import require
+from ..problem.lifted import of_one
+from ..problem.lifted_window import LiftedWindow, Rows
+from ..problem.parts import expanded_to
+from ..problem.problem import FitProblem
 from ..quantities.parameters import Parameters
 from ..scene.scene import Scene
-from .lifted import of_one
-from .lifted_window import LiftedWindow, Rows
-from .parts import expanded_to
-from .problem import FitProblem
 
 FIRST, MORE = 3, 3  # frames of a window that its start is fitted to at first, and how many times as many next
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError, SheetbendError
+from ..problem.problem import FitProblem
 from ..quantities.parameters import Parameters
 from ..statistics.least_squares import solved
 from ..statistics.profile import FARTHEST
-from .problem import FitProblem
 
 
 def one_step(problem: FitProblem, finer: FitProblem, u: np.ndarray) -> np.ndarray:

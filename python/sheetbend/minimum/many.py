@@ -12,15 +12,15 @@ import numpy as np
 from ..arrays.types import Array
 from ..errors import InputError, SheetbendError
 from ..experiment.experiment import Experiment
+from ..problem.coordinates import Coordinates
+from ..problem.counts import count
+from ..problem.journal import Evaluation, current
+from ..problem.parts import expanded_to
+from ..problem.recordings import Item, Recordings, norms, sharing_scenes, told, triangles
+from ..problem.workers import Common
 from ..quantities.parameters import Parameters
 from .approach import RIDGE, Approach
 from .arrow import Arrow
-from .coordinates import Coordinates
-from .counts import count
-from .journal import Evaluation, current
-from .parts import expanded_to
-from .recordings import Item, Recordings, norms, sharing_scenes, told, triangles
-from .workers import Common
 
 CHUNK = 16  # recordings in a piece of work
 SMALL = 1e-4  # of the cost of one row: what a step must promise

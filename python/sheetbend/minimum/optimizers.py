@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import InputError, SheetbendError
+from ..problem.problem import FitProblem
 from . import by_ceres, by_scipy
 from .approach import Approach
 from .by_ceres import ceres_trouble, has_ceres
-from .problem import FitProblem
 from .progress import Best, Minimum, Observer, Progress
 
 OPTIMIZERS = ("auto", "ceres", "scipy")

@@ -19,11 +19,11 @@ import numpy as np
 
 from ..arrays.types import Array
 from ..errors import SheetbendError
+from ..problem.problem import FitProblem
+from ..problem.triangle import triangle
+from ..problem.workers import Common
 from .approach import Approach, Tally
-from .problem import FitProblem
-from .triangle import triangle
 from .windows import STEPS, TOLERANCE, along, cut
-from .workers import Common
 
 LAST = 1e-3  # of the cost: tolerance in the last window
 ALIKE = 0.1  # of the cost: ends whose quadratic model differs by less are in one minimum

@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays.types import Array
+from ..problem.problem import FitProblem
 from ..statistics.spectral import frames_alike
-from .problem import FitProblem
 
 CLEAR = 3.0  # standard deviations
 _ALIKE = 0.05  # autocorrelation that still counts

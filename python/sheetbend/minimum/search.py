@@ -13,11 +13,11 @@ import numpy as np
 
 from ..arrays.checks import check_count
 from ..errors import InputError, SheetbendError
+from ..problem.problem import FitProblem
 from .approach import Approach, Tally
 from .conditioning import Condition
 from .growth import Growth, growths
 from .optimizers import named
-from .problem import FitProblem
 from .progress import Minimum, Progress
 from .race import Course, Raced, groups_of, race
 from .starts import drawn, off_bounds

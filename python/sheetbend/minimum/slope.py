@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..problem.problem import FitProblem
 from ..quantities.wording import short
 from ..statistics.gauge import RANK_TOLERANCE
 from .approach import inside
-from .problem import FitProblem
 from .progress import Minimum
 
 LOST = 0.1  # of the cost: a slope that promises so much is no end

@@ -14,12 +14,12 @@ import numpy as np
 
 from ..errors import SheetbendError
 from ..experiment.experiment import Experiment
+from ..problem.problem import FitProblem
 from ..quantities.parameters import RESTS
 from ..result.result import Refit
 from ..statistics.least_squares import solved, unexplained
 from .linear_step import gauss_newton, moves, one_step, residuals_there
 from .optimizers import refit
-from .problem import FitProblem
 from .refuted import refuted, words
 
 TIME_STEP, SWEEPS = "time step", "twice the sweeps"

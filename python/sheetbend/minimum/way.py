@@ -16,11 +16,11 @@ import numpy as np
 
 from ..arrays.checks import MOST_WHOLE, check_count, is_number, numbers
 from ..errors import InputError, SheetbendError
+from ..problem.problem import FitProblem
 from .approach import LEAST, Approach, Tally
 from .conditioning import Condition
 from .growth import Growth
 from .optimizers import minimize
-from .problem import FitProblem
 from .progress import Minimum, Observer, Progress
 from .slope import judged
 from .windows import STEPS, TOLERANCE, along, chosen, cut, holds_frames

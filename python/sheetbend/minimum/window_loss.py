@@ -16,12 +16,12 @@ import numpy as np
 from ..arrays.types import Array
 from ..experiment.cut import start_quantities
 from ..optional import require
+from ..problem.lifted import Lifted
+from ..problem.lifted_motion import Motion
+from ..problem.problem import FitProblem
 from ..statistics.chain import Chain
 from ..statistics.intervals import LIKELY
 from ..statistics.spectral import effective_deviation
-from .lifted import Lifted
-from .lifted_motion import Motion
-from .problem import FitProblem
 
 SMALLEST, LARGEST, LOOKED = 1e-6, 1.0, 37  # of the motion's size: gaps that are looked at, and how many
 

@@ -13,9 +13,9 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from ..errors import InputError
+from ..problem.problem import FitProblem
 from .approach import Approach, Tally
 from .growth import ROUGH, Growth
-from .problem import FitProblem
 from .progress import Observer, Progress
 
 SHARES = (1 / 27, 1 / 9, 1 / 3)  # of the longest motion

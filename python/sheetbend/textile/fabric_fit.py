@@ -11,10 +11,10 @@ import numpy as np
 from ..arrays.checks import check_each, check_kind, given_by_name, is_list, is_number
 from ..arrays.types import Array
 from ..errors import InputError, NoEquilibriumError
-from ..minimum.linear_algebra import one_blas_thread
 from ..objects.fabric import Fabric
 from ..objects.laws import Spline, Stiffening
 from ..optional import require
+from ..problem.linear_algebra import one_blas_thread
 from ..quantities.parameters import Parameter, Parameters
 from ..quantities.wording import figures, short
 from ..report.tables import Section, plain_section

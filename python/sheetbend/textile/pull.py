@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_count, finite, is_list, is_number
 from ..errors import InputError
-from ..minimum.linear_algebra import one_blas_thread
 from ..objects.fabric import Fabric
 from ..objects.laws import Exponential, Law, Linear, Sinh, Spline
+from ..problem.linear_algebra import one_blas_thread
 from .curve import Curve, chosen, mean_curve, same_test
 from .fabric_fit import FabricFit, Measured, fit_fabric
 from .flat import warp_angle

@@ -11,9 +11,9 @@ import numpy as np
 
 from ..arrays.checks import check_each, check_kind, is_number
 from ..errors import InputError
-from ..minimum.linear_algebra import one_blas_thread
 from ..objects.fabric import Fabric
 from ..objects.laws import Exponential, Law, Linear, Sinh
+from ..problem.linear_algebra import one_blas_thread
 from .curve import Curve
 from .fabric_fit import FabricFit, Measured, fit_fabric
 from .pull import first_guess, mean_loads, pulled
