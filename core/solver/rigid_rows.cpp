@@ -14,6 +14,7 @@ namespace {
 constexpr int at_row = sheetbend_blocks::row;
 constexpr double gives_way = 1e-10;     // D of a row that does, of J W J^T
 constexpr double stiff_joint = 1e-4;    // likewise of a joint of bodies, whose block has multipliers anyway
+constexpr double firm_joint = 1e-7;     // likewise of one that is softened as rigid rows are
 constexpr double softening = 1e-5;      // S, of J diag(K)^-1 J^T
 constexpr std::size_t few = 256;        // rows whose order is kept, as a border of H does (condensed.h)
 constexpr double far_less = 10.0;       // ratio of shares from which a row is exchanged
@@ -47,9 +48,11 @@ int kind_of_bodies() {
 void RigidRows::find(const Scene& scene, const Given& given, const double* at) {
   *this = {};
   Numbered own;
-  std::vector<char> axis(scene.nodes(), 0);  // of a body
-  for (const Body& body : scene.bodies)
-    for (const int node : body.axes) axis[node] = 1;
+  std::vector<char> axis(given.block.particles.size(), 0);  // of a body that is kept rigid: no frame of shape matching
+  for (const MemberRun& run : given.block.runs)
+    if (const Group& group = scene.groups[run.group]; group.kind == kind_of_bodies())
+      for (int i = 0; i < run.count; ++i)
+        for (int k = 0; k < group.arity; ++k) axis[run.nodes[lane_at(i, group.arity, k)] / at_row] = 1;
   for (int r = 0; r < static_cast<int>(given.block.runs.size()); ++r) {
     const MemberRun& run = given.block.runs[r];
     const Group& group = scene.groups[run.group];
@@ -69,8 +72,7 @@ void RigidRows::find(const Scene& scene, const Given& given, const double* at) {
         stiffest = std::max(stiffest, sum);
       }
       bool joint = false;
-      for (int k = 0; k < group.arity; ++k)
-        joint |= axis[given.block.particles[run.nodes[lane_at(i, group.arity, k)] / at_row]] != 0;
+      for (int k = 0; k < group.arity; ++k) joint |= axis[run.nodes[lane_at(i, group.arity, k)] / at_row] != 0;
       if (a != 0.0 && !(a <= (joint ? stiff_joint : gives_way) * (1.0 + g) * stiffest)) continue;
       members_.push_back({group.kind, r, i, run.first_row[i], group.rows, 0, group.arity, group.damped});
       for (int j = 0; j < group.rows; ++j) {
@@ -254,9 +256,14 @@ void RigidRows::add_elements(const Given& given, double* at, const double* stiff
                              std::vector<Numbers<double>>& elements) {
   S_ = D_;
   std::vector<double> soft(D_.size(), 0.0);
+  // Stiffness of the joints that give way.
+  std::vector<double> joints(3 * static_cast<std::size_t>(given.block.movable), 0.0);
+  for_each_number(given.block, [&](int j, int dof, double J) {
+    if (D_[j] * weight_[j] > firm_joint) joints[dof] += J * J / D_[j];
+  });
   for_each_number(given.block, [&](int j, int dof, double J) {
     const int p = at_row * (dof / 3);
-    soft[j] += softening * J * J / (1.0 / at[p + 3] + stiffness[p + dof % 3]);
+    soft[j] += softening * J * J / (1.0 / at[p + 3] + stiffness[p + dof % 3] + joints[dof]);
   });
   for (int j = 0; j < size(); ++j) S_[j] = std::max({D_[j], soft[j], left_out_[j] ? 1.0 : 0.0});
   Numbered own;
