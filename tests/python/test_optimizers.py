@@ -227,6 +227,20 @@ def test_ctrl_c_during_the_refits_keeps_the_converged_values(monkeypatch):
     assert found.report().startswith("Fit converged, then interrupted,")
 
 
+@needs_ceres
+@pytest.mark.parametrize("damping", [{}, {"initial": 0.06, "lower": 0.025}], ids=["inside", "at a limit"])
+def test_each_iteration_is_told_once(damping):
+    """Ceres begins with the point where the walk, or its own run before, ended. That was told again, with the same
+    number."""
+    seen: list[Progress] = []
+    wanted = WANTED | {"rope_bend_damping": damping}
+    found = sb.fit(
+        [swinging()], parameters=wanted, optimizer="ceres", refine=False, profiles=False, progress=seen.append
+    )
+    numbers = [progress.iteration for progress in seen if progress.condition is None]
+    assert numbers == list(range(numbers[0], found.result.iterations + 1)) and numbers[0] <= 1
+
+
 def test_ctrl_c_at_a_further_start_keeps_the_first(monkeypatch):
     whole = sb.fit([swinging()], parameters=WANTED, refine=False)
     exact, starts = way.minimize, []

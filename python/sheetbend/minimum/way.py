@@ -85,6 +85,7 @@ class Way:
     first: float | None = None  # cost of the whole motion at the start
     u: np.ndarray | None = None  # the best point of what was fitted last
     condition: Condition | None = None  # at the start
+    last: tuple[int, float | None] | None = None  # number and window of the iteration that was told last
 
     def end(self, grown: Sequence[Growth]) -> Minimum:
         """Raises SheetbendError where the whole motion diverges at the start and after every window."""
@@ -142,7 +143,10 @@ class Way:
     def _optimized(self, walk: Approach, most: int) -> Minimum:
         """On from a walk by the optimizer."""
         own, first = self.settings, walk.cost if np.isfinite(walk.cost) else None
-        observe = self._observer(None, self.taken.iterations)
+
+        def observe(p: Progress) -> None:
+            self._tell(replace(p, iteration=self.taken.iterations + p.iteration))
+
         return minimize(self.problem, walk.u, own.optimizer, most, own.tolerance, observe, first=first)[0]
 
     def _began(self, u: np.ndarray, cost: float) -> None:
@@ -194,15 +198,14 @@ class Way:
 
     def _arrived(self, walk: Approach, window: float | None) -> None:
         self.u = walk.u
-        observe = self._observer(window, 0)
-        if observe is not None:
-            observe(Progress(self.taken.iterations, walk.cost, walk.u.copy()))
+        self._tell(Progress(self.taken.iterations, walk.cost, walk.u.copy(), window))
 
-    def _observer(self, window: float | None, before: int) -> Observer | None:
-        observe = self.settings.progress
-        if observe is None:
-            return None
-        return lambda p: observe(replace(p, iteration=before + p.iteration, window=window))
+    def _tell(self, progress: Progress) -> None:
+        """Each iteration once: an optimizer begins with the point where the walk, or its own run before, ended."""
+        here = progress.iteration, progress.window
+        if self.settings.progress is not None and here != self.last:
+            self.last = here
+            self.settings.progress(progress)
 
     def _counted(self, end: Minimum) -> Minimum:
         return replace(
