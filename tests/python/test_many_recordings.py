@@ -97,6 +97,8 @@ def test_a_wrong_given_number_is_not_taken_for_noise_in_silence() -> None:
     few = sb.fit(wrong[:3], parameters=WANTED, profiles=False).result
     assert few["rope_EI"].verdict == "doubtful" and any("rope_length were 1.9 % less" in w for w in few.warnings)
     assert fitted().warnings == ()
+    (worse,) = replace(found, misfit=(9.0, *found.misfit[1:])).warnings  # one as well that is missed by far
+    assert "swing 0 (9 sigma)" in worse and "sheetbend.fit" in worse
 
 
 @pytest.mark.parametrize("scale", [[2.54, 2.54, 2.54], [1.0, 1.0, -1.0]], ids=["inches", "mirrored"])

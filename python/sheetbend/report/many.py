@@ -17,7 +17,7 @@ from ..files.door import ROOM, bounded_bytes, reading
 from ..files.json_file import json_content
 from ..files.typed import as_dataclass, as_type, mapping
 from ..files.whole import write_text
-from ..quantities.wording import short
+from ..quantities.wording import several, short
 from ..result.estimate import Estimate, check_widths, estimate_of
 from ..statistics.intervals import NORMAL
 from .report import estimate_row
@@ -29,6 +29,10 @@ LABELS = [f"{100 * share:g} %" for share in SHARES]
 FAR, LEAST = 2.0, 0.1  # times the median misfit, and sigma: recordings with more than both are named
 MUCH = 1.7  # sigma, the median misfit above which a warning says that the model misses most recordings
 NAMED = 5
+LACKS = (
+    "the model lacks something, or a given value or sigma is wrong. Fit three of the recordings with sheetbend.fit, "
+    "which looks for the cause"
+)
 
 
 @dataclass(frozen=True)
@@ -100,24 +104,23 @@ class ManyFit:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What speaks against the fit: recordings that it misses by far, or, where there are none, all of them."""
+        """What speaks against the fit: recordings that it misses by far, and that it misses most of them."""
         most = float(np.median(self.misfit))
         far = sorted(zip(self.misfit, self.recordings, strict=True), reverse=True)
         far = [(x, name) for x, name in far if x > max(FAR * most, LEAST)]
         if far:
-            names = ", ".join(f"{name} ({short(x, 3)} sigma)" for x, name in far[:NAMED])
-            more = f" and {len(far) - NAMED} more" if len(far) > NAMED else ""
+            names = several([f"{name} ({short(x, 3)} sigma)" for x, name in far], NAMED)
+            others = f". If half of the others are still missed by more than {MUCH:g} sigma then, {LACKS}"
             return (
                 f"{len(far)} of {len(self.misfit)} recordings are missed by more than {FAR:g} times the median of "
-                f"{short(most, 3)} sigma: {names}{more}. Check their markers, axes, units and clocks, and leave out "
-                "those that cannot be mended",
+                f"{short(most, 3)} sigma: {names}. Check their markers, axes, units and clocks, and leave out those "
+                f"that cannot be corrected{others if most > MUCH else ''}",
             )
         if not most > MUCH:
             return ()
         return (
             f"half of the recordings are missed by {short(most, 3)} sigma or more, and the intervals take that for "
-            "noise. The model lacks something, or a given value or sigma is wrong: fit three of them with "
-            "sheetbend.fit, which looks for the cause",
+            f"noise: {LACKS}",
         )
 
     def report(self) -> str:
