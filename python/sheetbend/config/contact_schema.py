@@ -144,7 +144,7 @@ class CollisionsSection(Section):
     are several radii."""
 
     of: Name | list[Name] = key(
-        ..., "a set of particles, or several: all of their particles, none of which is pinned or driven"
+        ..., "a set of particles, or several: all of their particles, none of which is pinned, driven or on a tether"
     )
     radius: Finite | list[Finite] = key(
         ..., "of the balls: one for all, or one for each set that is named in `of`", "m"

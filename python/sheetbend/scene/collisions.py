@@ -33,7 +33,8 @@ class CollidingScene(SelfTouchingScene):
         each other; they bounce off shapes if `add_contact` has them too.
 
         Args:
-            what: (n,) particles, also balls on strings and the centers of bodies; none that is pinned or driven.
+            what: (n,) particles, also balls on strings and the centers of bodies; none that is pinned, driven or on a
+                tether.
             radius: m, one for all (`<name>_contact_radius`), or one for each (`<name>_contact_radius_0` and so on).
             restitution: speed after an impact over that before, along the line of the centers; 0 to 1
                 (`<name>_restitution`).
@@ -41,7 +42,8 @@ class CollidingScene(SelfTouchingScene):
 
         Raises:
             SceneError: fewer than two particles, particles that are listed twice, radii or a restitution out of range;
-                when the scene is compiled: particles that are pinned or driven, or that start inside each other.
+                when the scene is compiled: particles that are pinned, driven or on a tether, or that start inside each
+                other.
         """
         self._building()
         if self.contacts.balls is not None:
