@@ -81,23 +81,24 @@ def tosses(folder: Path | None = None) -> list[Toss]:
     return [Toss(f"toss {toss}", x[a:b], q[a:b], int(free)) for a, b, toss, free in ends]
 
 
-def start_of(toss: Toss, seen: int, down: np.ndarray) -> dict[str, np.ndarray]:
-    """The state that the cube starts with. Its center of mass flies along a parabola, and not its middle."""
+def start_of(toss: Toss, seen: int, down: np.ndarray, center: np.ndarray) -> dict[str, np.ndarray]:
+    """The state that the cube starts with. Its center of mass (3,) m flies along a parabola, and not its middle."""
     first = slice(0, min(seen, toss.free))
-    flown = toss.positions[first] + matrices_of(toss.quaternions[first]) @ CENTER
+    flown = toss.positions[first] + matrices_of(toss.quaternions[first]) @ center
     start = sb.start_of_poses(toss.times[first], flown, toss.quaternions[first], down)
-    arm = start["rotation"] @ CENTER
+    arm = start["rotation"] @ center
     return {**start, "at": start["at"] - arm, "velocity": start["velocity"] - np.cross(start["spin"], arm)}
 
 
 def scene_of(toss: Toss, seen: int, restitution: float | None = None) -> sb.Scene:
-    """The cube that flies from its first `seen` frames onto the table, which is soft, or rigid with a restitution.
+    """The cube that flies from its first `seen` frames onto the table, which is soft, or rigid with a restitution (the
+    authors' model, whose center of mass is the middle).
 
     `rounding` is the radius of its corners, m. `stretch` is what its lengths are longer than SCALE makes them, and
     gravity with them.
     """
     down = np.array([0.0, 0.0, -9.81 / SCALE])
-    start = start_of(toss, seen, down)
+    start = start_of(toss, seen, down, CENTER if restitution is None else np.zeros(3))
     scene = sb.Scene(toss.name, gravity=down)
     cube = scene.add_body("cube", of=sb.Inertia.box(MASS, np.full(3, SIDE / SCALE)), **start)
     soft = {"stiffness": STIFFNESS, "dissipation": FROM["table_contact_dissipation"]}

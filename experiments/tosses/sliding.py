@@ -31,7 +31,7 @@ FOUND = {  # expected/landings.txt
 }
 LEVEL = 2e-4  # that the cosine of the tilt is off 1: 1.1 degrees
 HIGHER = 8e-4  # m, than at rest
-WINDOW = 9  # frames
+WINDOW, APART = 9, 3  # frames, and from one window to the next
 SPEEDS = (0.03, 0.1, 0.2, 0.3, 0.4, 0.5, 0.65)  # m/s
 
 
@@ -46,7 +46,7 @@ def sliding(x: np.ndarray) -> list[tuple[float, float]]:
     """Speed in m/s and friction in each window of a path (frames, 3) m that lies flat."""
     t = (np.arange(WINDOW) - WINDOW // 2) / RATE
     found = []
-    for first in range(0, len(x) - WINDOW, 3):
+    for first in range(0, len(x) - WINDOW, APART):
         bend, v, _ = np.polyfit(t, x[first : first + WINDOW, :2], 2)
         speed = float(np.linalg.norm(v))
         found.append((speed, float(-2.0 * bend @ v / speed * SCALE / 9.81)))
@@ -64,7 +64,7 @@ def main() -> None:
     speed, friction = np.array(slid).T
     for low, high in pairwise(SPEEDS):
         own = friction[(speed >= low) & (speed < high)]
-        error = own.std() / np.sqrt(len(own))
+        error = own.std() / np.sqrt(len(own) * APART / WINDOW)  # as windows overlap
         print(f"{low:g} to {high:g} m/s: friction {own.mean():.3f} +- {error:.3f}, {len(own)} windows")
     frames = np.median(late, axis=0)
     print(f"flat {frames[0]:.0f} frames after the first contact, predicted {frames[1]:.0f} (medians)")
