@@ -334,6 +334,8 @@ def test_a_wrist_that_holds_a_body_weighs_its_load(tmp_path: Path) -> None:
     wrist = sb.simulate_forces(scene, times[1:], hand, solver)
     same = sb.simulate_forces(scene, times[1:], hand.particles.tolist(), solver)
     assert (wrist.forces == same.forces).all()
+    with pytest.raises(sb.InputError, match="is a body of another scene"):
+        sb.simulate_forces(sb.rope(0.1, 8, density=0.05, EI=1e-4), [0.01], hand, solver)
     np.savez(tmp_path / "wrist.npz", times=wrist.times, forces=wrist.forces)
     sb.Recording(load.pose(sb.simulate(scene, times, solver))[0][:, None], times).save(tmp_path / "seen.npz")
     (tmp_path / "held.toml").write_text(HELD, encoding="utf-8")

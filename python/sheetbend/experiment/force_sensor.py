@@ -169,11 +169,18 @@ class ForceSensor:
             raise InputError(f"{path}.quantities", "are not in the scene", missing, fix)
 
     def particles(self, scene: Scene, path: str = "force") -> list[int]:
-        """What the support holds, directors included; the place of the first one is where torques are taken."""
+        """What the support holds, directors included; the place of the first one is where torques are taken.
+
+        Raises:
+            InputError: no such rope, or a body of another scene.
+        """
         if isinstance(self.at, Sequence) and len(self.at) == 2 and isinstance(self.at[0], str):
             return end_of_rope(scene, str(self.at[0]), str(self.at[1]), path)
         if isinstance(self.at, Body):
-            return [int(p) for p in self.at.particles]
+            own = scene.bodies.get(self.at.name)
+            if own is None or not np.array_equal(own.particles, self.at.particles):
+                raise InputError(f"{path}.at", "is a body of another scene", self.at.name, "name one of this scene")
+            return [int(p) for p in own.particles]
         found: list[int] = scene.node_array(f"{path}.at", self.at).tolist()
         return list(dict.fromkeys(found))
 
