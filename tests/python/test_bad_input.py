@@ -124,10 +124,6 @@ SCENE = {
     "force not finite": ("add_force.forces", push(forces=[[0, 0, NAN]])),
     "force backwards in time": ("add_force.times", push(forces=np.zeros((2, 1, 3)), times=[1.0, 0.0])),
     "force twice": ("add_force.particles", after(*[lambda s: s.add_force([1], [[0, 0, 1]])] * 2)),
-    "force with other knots": (
-        "add_force.times",
-        after(lambda s: s.add_force([1], [[0, 0, 1]]), lambda s: s.add_force([2], [[0, 0, 1]], times=[1.0])),
-    ),
     "unknown kind": ("kind", link("spring")),
     "group name taken": ("name", after(lambda s: s.add_constraints("distance", [[0, 1]], name="links"), scene=linked)),
     "stencil of the wrong size": ("g.particles", link(particles=[[0, 1, 2]])),

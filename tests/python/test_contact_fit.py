@@ -84,7 +84,7 @@ def test_a_rope_that_sticks_tells_that_friction_is_large_enough(start: float, se
     (friction,) = fit.result.estimates
     assert friction.verdict == "one-sided"
     assert 0.18 < friction.lower <= 0.201  # the slope; what slides by less than the noise shows is allowed
-    assert friction.upper is None and "sticks" in friction.words
+    assert friction.upper is None and "stick" in friction.words
 
 
 def test_a_start_that_sticks_is_no_minimum_of_a_recording_that_slides() -> None:

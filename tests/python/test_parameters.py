@@ -66,7 +66,7 @@ def tied(name: str, target: str, private: bool = False) -> Parameter:
         ([Parameter(name="a", initial=1.0), Parameter(name="a", initial=2.0)], "twice"),
         ([Parameter(name="a", initial=1.0, fixed=True)], "nothing to fit"),
         ([], "nothing to fit"),
-        ([Parameter(name="a", initial=1.0), tied("b", "c")], "no parameter"),
+        ([Parameter(name="a", initial=1.0), tied("b", "c")], "not a parameter"),
         ([Parameter(name="a", initial=1.0), tied("b", "c"), tied("c", "b")], "leads back"),
         ([Parameter(name="a", initial=1.0), tied("b", "b")], "leads back"),
         ([Parameter(name="a", initial=1.0, private=True), tied("b", "a")], "one value per recording"),
