@@ -34,9 +34,8 @@ void ImplicitBlock::give_up(const DirectBlock& block) const {
           << potential.balance() << " of the largest force is left at particle " << node;
   if (!potential.pairs.empty() && block.surface.rubs())
     fix =
-        "leave out the friction between pieces that touch each other (add_self_contact without friction), which may "
-        "not "
-        "balance where layers are pressed together, or use another substep";
+        "use another substep, allow more iterations, or leave out the friction between pieces that touch each other, "
+        "which may not balance where layers are pressed together";
   Numbers<double> from = x_, to = x_, predicted = potential.target;
   move(from, 1.0, d_, to);
   if (!settle_frames(block, predicted, to)) {

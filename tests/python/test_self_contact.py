@@ -60,7 +60,7 @@ def test_where_forces_do_not_balance_friction_of_pairs_is_named():
     scene = crossed(0.0101)
     scene.add_self_contact(radius=0.005, friction=0.3)
     few = sb.Solver(h=1e-3, method="implicit", iterations=2)
-    with pytest.raises(sb.UnbalancedError, match=r"Fix: leave out the friction between pieces"):
+    with pytest.raises(sb.UnbalancedError, match="or leave out the friction between pieces"):
         sb.simulate(scene, [0.0, 0.1], few)
 
 
