@@ -52,6 +52,25 @@ def test_a_draft_fits_the_losses_that_a_decay_shows(tmp_path: Path, lost: str) -
         assert (words.split(" explain")[0].count(" and ") == 1) == (len(wanted) == 2)
 
 
+def test_an_arm_that_is_held_before_it_swings_and_rests_after_it(tmp_path: Path) -> None:
+    """Places that do not change by a bit, as of an encoder, had all the weight: no loss was fitted."""
+    x = swing(0.03, 0.0, 0.0)
+    x = np.concatenate([np.repeat(x[:1], 200, axis=0), x, np.repeat(x[-1:], 500, axis=0)])
+    _, content = drafted(tmp_path, np.round(x, 4), RATE, 0.0)
+    (arm,) = content["scene"]["pendulum"]
+    assert arm["friction"] == pytest.approx(0.03, rel=0.1)
+    assert "viscosity" not in arm and "drag" not in arm
+
+
+def test_what_is_lost_in_a_long_gap_is_not_guessed(tmp_path: Path) -> None:
+    x = swing(0.0, 0.02, 0.0) + np.random.default_rng(0).normal(0.0, 3e-4, (2500, 2, 3))
+    x[500:1200, 1] = np.nan
+    _, content = drafted(tmp_path, x, RATE, 0.0)
+    (arm,) = content["scene"]["pendulum"]
+    assert arm["viscosity"] == pytest.approx(0.02, rel=0.1)
+    assert "friction" not in arm and "drag" not in arm
+
+
 def test_a_swing_that_shows_no_loss_and_one_that_two_explain(tmp_path: Path) -> None:
     x = swing(0.0, 0.0, 0.0) + np.random.default_rng(0).normal(0.0, 3e-4, (2500, 2, 3))
     found, content = drafted(tmp_path, x, RATE, 0.0)

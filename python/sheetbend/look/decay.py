@@ -4,8 +4,9 @@ With the arm's angle q and rate w, and the length L of a point mass that swings 
 
     w^2/2 + g/L (1 - cos(q - q0)) + a int |w| dt + b int w^2 dt + c int |w|^3 dt
 
-does not change. It is linear in g/L cos q0, g/L sin q0, a, b, c and its value. Dry friction lets a swing become smaller
-linearly in time, viscosity exponentially, drag by its inverse.
+does not change. It is linear in g/L cos q0, g/L sin q0, a, b, c and its value. In a long gap no curve tells what is
+lost, so its value is another one behind it. Dry friction lets a swing become smaller linearly in time, viscosity
+exponentially, drag by its inverse.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ from .swing import Swing
 
 WORDS = {"friction": "dry friction", "viscosity": "a viscous hinge", "drag": "drag of the air"}
 """By key of `[[scene.pendulum]]`."""
+STAYS = 0.01  # of the noise of energies where it moves most: below, the arm is held or at rest, and loses nothing
+BRIDGED = 4.0  # memories, of a gap at most
 RIVAL = 6.0  # of Schwarz's criterion: with less of a difference, a decay hardly tells two models apart
 
 
@@ -60,7 +63,7 @@ def decay(swing: Swing, memory: float) -> Decay:
     """The losses with the best of Schwarz's criterion (1978), none of them negative; none where nothing is lost.
 
     Args:
-        swing: of one arm.
+        swing: of one arm, over the whole recording, since losses differ most where the swing has become small.
         memory: s, over which it is smoothed: energies so far apart have independent noise.
     """
     t, q, w, seen = swing.times, swing.angles[0], np.abs(swing.rates[0]), swing.seen
@@ -68,14 +71,17 @@ def decay(swing: Swing, memory: float) -> Decay:
     lost = np.zeros_like(powers)
     lost[1:] = np.cumsum(np.diff(t)[:, None] * 0.5 * (powers[1:] + powers[:-1]), axis=0)
     # of the parabola fitted over `memory`, noise of the rate is 2.3 times that of the angle per `memory`
-    noise = np.hypot(w, memory / 2.3 * np.gradient(swing.rates[0], t))[:, None]
-    energy, height = 0.5 * w[:, None] ** 2, np.stack([np.ones_like(q), np.cos(q), np.sin(q)], axis=1)
-    energy, height, lost = ((part / noise)[seen] for part in (energy, height, lost))
-    samples = float(t[-1] - t[0]) / memory
+    noise = np.hypot(w, memory / 2.3 * np.gradient(swing.rates[0], t))
+    told = seen & (noise > STAYS * noise.max(where=seen, initial=0.0))
+    part = np.cumsum(np.diff(t[seen], prepend=t[0]) > BRIDGED * memory)
+    value = (part[:, None] == np.unique(part))[told[seen]] / noise[told, None]
+    energy, height = 0.5 * w[:, None] ** 2, np.stack([np.cos(q), np.sin(q)], axis=1)
+    energy, height, lost = (of_all[told] / noise[told, None] for of_all in (energy, height, lost))
+    samples = float(t[-1] - t[0]) * float(told.mean()) / memory
     found: dict[tuple[str, ...], tuple[float, Array]] = {}
     for count in range(len(WORDS) + 1):
         for chosen in combinations(range(len(WORDS)), count):
-            rows = np.concatenate([lost[:, chosen], height], axis=1)
+            rows = np.concatenate([lost[:, chosen], height, value], axis=1)
             values = np.linalg.lstsq(rows, -energy[:, 0])[0]
             if (values[:count] >= 0.0).all():
                 rest = float(np.square(energy[:, 0] + rows @ values).mean())
