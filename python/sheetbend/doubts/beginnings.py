@@ -40,7 +40,7 @@ from ..statistics.blocks import FEWEST, LEVEL, short_of_frames
 from ..statistics.covariance import Covariance, covariance
 from ..statistics.gauge import null_space
 from ..statistics.identifiability import Identifiability
-from ..statistics.intervals import reach_of
+from ..statistics.intervals import critical_t, reach_of
 from ..statistics.shared_errors import moved_by
 from ..statistics.spectral import autocorrelation
 from ..statistics.stretches import scatter, within_sigma
@@ -251,7 +251,7 @@ def _differences(end: Whole, b: Beginning, level: float) -> Mapping[int, tuple[f
     special = require("scipy.special", "fit")
     if not special.fdtrc(len(columns), degrees, score / len(columns)) < level:
         return {}
-    t = float(special.stdtrit(degrees, 0.975))
+    t = critical_t(degrees)
     found = {c: (float(d), t * float(s)) for c, d, s in zip(columns, step, sd, strict=True)}
     size = {c: _size(b.problem, u, c) for c in columns}
     return {c: (d, s) for c, (d, s) in found.items() if abs(d) > max(s, CLEAR * size[c]) and s < KNOWN * size[c]}

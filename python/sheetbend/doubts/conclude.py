@@ -139,12 +139,10 @@ def _beside(
         _, _, J = problem.evaluate(u)
         columns = [parameters.free.index(name) for name in lost]
         apart = [i for i in range(len(problem.experiments)) if not J[first[i] : first[i + 1], columns].any()]
-        rest = FitProblem(
-            [problem.experiments[i] for i in apart],
-            problem.given,
-            [problem.recordings[i] for i in apart],
-            problem.threads,
-            Parameters(p for name, p in parameters.items() if parameters.roots[name][0] not in lost),
+        rest = problem.replaced(
+            experiments=[problem.experiments[i] for i in apart],
+            recordings=[problem.recordings[i] for i in apart],
+            expanded=Parameters(p for name, p in parameters.items() if parameters.roots[name][0] not in lost),
         )
         at = rest.parameters.to_internal(parameters.to_physical(u))
         mine = [{name: part for name, part in parts.items() if name not in lost} for parts in (refined, systematic)]

@@ -96,12 +96,8 @@ def _columns(problem: FitProblem, u: Array, names: Sequence[str]) -> dict[str, A
         if name in e.scene.quantities and e.scene.quantities[name].value > 0.0
     ]
     private = [Parameter(name=name, private=True, log=True, unit=units[name]) for name in names]
-    with_losses = FitProblem(
-        problem.experiments,
-        Parameters([*problem.given.values(), *private]),
-        problem.recordings,
-        problem.threads,
-        Parameters([*held, *freed]),
+    with_losses = problem.replaced(
+        parameters=Parameters([*problem.given.values(), *private]), expanded=Parameters([*held, *freed])
     ).follow(problem)
     _, _, J = with_losses.evaluate(with_losses.parameters.initial())
     columns = dict(zip(with_losses.parameters.free, J.T, strict=True))

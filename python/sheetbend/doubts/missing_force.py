@@ -30,7 +30,7 @@ from ..statistics.blocks import short_of_frames
 from ..statistics.covariance import covariance
 from ..statistics.gauge import RANK_TOLERANCE, null_space
 from ..statistics.identifiability import Identifiability
-from ..statistics.intervals import reach_of
+from ..statistics.intervals import critical_t, reach_of
 from ..statistics.least_squares import left_by, spanned
 from .contradictions import value_words
 from .directions import EXPLAINS, LEVEL, noise_in
@@ -130,7 +130,7 @@ def freed(problem: FitProblem, u: Array) -> Freed | None:
     ratio = (float(r @ r) - float(final @ final)) / added / (float(final @ final) / freedom)
     chance = float(statistics.fdtrc(added, max(freedom / alike, 1.0), ratio / alike))
     variance = short_of_frames(spread, int(np.ptp(layout.frame)) + 1) * np.diag(spread.matrix)
-    reach = statistics.stdtrit(np.maximum(spread.degrees, 1.0), 0.975) * np.sqrt(variance)
+    reach = critical_t(np.maximum(spread.degrees, 1.0)) * np.sqrt(variance)
     size = np.linalg.norm(J[:, shared], axis=0)
     steps: dict[int, tuple[float, float] | None] = {int(c): None for c in shared}
     for k, c in enumerate(kept):

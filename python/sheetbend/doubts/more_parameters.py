@@ -17,10 +17,7 @@ def with_parameter(problem: FitProblem, more: Parameter, expanded: Sequence[Para
     Args:
         expanded: those of the single experiments, where it is private.
     """
-    return FitProblem(
-        problem.experiments,
-        Parameters([*problem.given.values(), more]),
-        problem.recordings,
-        problem.threads,
-        Parameters([*problem.parameters.values(), *([more] if expanded is None else expanded)]),
+    return problem.replaced(
+        parameters=Parameters([*problem.given.values(), more]),
+        expanded=Parameters([*problem.parameters.values(), *([more] if expanded is None else expanded)]),
     )
