@@ -60,6 +60,8 @@ void RigidRows::find(const Scene& scene, const Given& given, const double* at) {
     double* values = given.values[r].data();
     if (!any_kind<double>(group.kind).balances) continue;
     const int dofs = 3 * group.arity;
+    bool slides = false;  // dry friction, whose bound makes a kink: Newton's method finds it without a multiplier
+    with_kind(group.kind, [&]<class K>(K) { slides = Yields<K>; });
     for (int i = 0; i < run.count; ++i) {
       double& a = values[lane_at(i, count, 0)];
       const double g = group.damped ? values[lane_at(i, count, 1)] : 0.0;
@@ -72,7 +74,8 @@ void RigidRows::find(const Scene& scene, const Given& given, const double* at) {
         stiffest = std::max(stiffest, sum);
       }
       bool joint = false;
-      for (int k = 0; k < group.arity; ++k) joint |= axis[run.nodes[lane_at(i, group.arity, k)] / at_row] != 0;
+      for (int k = 0; k < group.arity && !slides; ++k)
+        joint |= axis[run.nodes[lane_at(i, group.arity, k)] / at_row] != 0;
       if (a != 0.0 && !(a <= (joint ? stiff_joint : gives_way) * (1.0 + g) * stiffest)) continue;
       members_.push_back({group.kind, r, i, run.first_row[i], group.rows, 0, group.arity, group.damped});
       for (int j = 0; j < group.rows; ++j) {

@@ -243,6 +243,20 @@ def test_stiff_mounts_balance_in_implicit_and_give_way_by_their_force(compliance
     assert np.abs(swung(compliance) - swung(None)).max() < 20.0 * compliance + 1e-11  # m, with forces of up to 9 N
 
 
+@pytest.mark.parametrize(("mass", "slip"), [(1e-5, 1e-3), (1e-3, 1e-6)])
+def test_dry_friction_of_a_light_body_slides_in_implicit(mass: float, slip: float) -> None:
+    """It is stiff beside such a body, but a multiplier would be in the way of its bound."""
+    scene = sb.Scene("light")
+    light = scene.add_body("light", of=sb.Inertia.box(mass, (0.01, 0.01, 0.01)), at=(0.0, 0.0, 0.0))
+    heavy = scene.add_body("heavy", of=sb.Inertia.box(0.3, (0.1, 0.03, 0.02)), at=(0.05, 0.0, 0.0))
+    sb.hinge(None, light, at=(0, 0, 0), axis=(0, 1, 0), friction=0.05, slip_angle=slip)
+    sb.fixed(light, heavy, at=(0.01, 0, 0))
+    motion = sb.simulate(scene, np.arange(26) * 4e-3, sb.Solver(h=4e-3, method="implicit"))
+    inertia = 0.3 * (0.1**2 + 0.02**2) / 12.0 + 0.3 * 0.05**2
+    turned = 0.5 * (0.3 * 9.81 * 0.05 - 0.05) / inertia * 0.1**2  # rad, as gravity's arm hardly shortens
+    assert heavy.pose(motion)[0][-1, 2] == pytest.approx(-0.05 * np.sin(turned), rel=0.1)
+
+
 def arms(angles: list[float], solver: sb.Solver, until: float) -> np.ndarray:
     """Angles of the triple pendulum of the oracle, from bodies on hinges."""
     scene, top, upper, bodies = sb.Scene("triple"), np.zeros(3), None, []
