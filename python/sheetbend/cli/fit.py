@@ -46,6 +46,7 @@ from .screen import heading, listing, show
 from .targets import check_targets
 
 STAYS = "the journal stays: the same command with --resume continues from here"
+PATTERN = re.compile(r"[*?[]")  # of several files
 
 
 def fit(
@@ -104,10 +105,10 @@ def fit(
     def command(console: Console) -> Outcome:
         config, *others = configs
         for other in others:
-            if other.suffix.lower() != ".toml":
+            if other.suffix.lower() != ".toml" and not PATTERN.search(str(other)):
                 fix = "give TOML files; values of an earlier fit are started from with --from fit.json"
-                raise ConfigError("--resume" if resume else "configs", "is no configuration", str(other), fix)
-        if others or (re.search(r"[*?[]", str(config)) and not config.exists()):
+                raise ConfigError("--resume" if resume else "configs", "is not a configuration", str(other), fix)
+        if others or (PATTERN.search(str(config)) and not config.exists()):
             if start is not None or movie is not None:
                 option = "--from" if start is not None else OPTION
                 raise ConfigError(option, "is not for several fits", str(start or movie), "leave it out")
