@@ -1,11 +1,11 @@
 """Three rigid bodies on hinges, as twins of a triple pendulum: inertia, centers and viscosities from swings.
 
-    python experiments/triple_pendulum/triple.py [--draws 1] [--dry] [--known]
+    python experiments/triple_pendulum/triple.py [--draws 1] [--dry] [--known] [--first 0.3]
 
 The recordings come from the equations of Lagrange in the three angles, integrated by an explicit method of eighth
 order, not from the simulator. Each draw of the noise is fitted to two pieces, and two others are predicted from their
-first samples. With --dry the hinges have dry friction in place of viscosity. With --known the pieces are predicted from
-the same first samples with the true numbers: what is left of the error then comes from the start.
+first samples (--first, in s). With --dry the hinges have dry friction in place of viscosity. With --known the pieces
+are predicted from the same first samples with the true numbers: what is left of the error comes from the start.
 """
 
 from __future__ import annotations
@@ -140,28 +140,28 @@ def scene_of(start: np.ndarray, values: dict[str, float], law: str) -> tuple[sb.
     return scene, places
 
 
-def experiment(name: str, x: np.ndarray, law: str, known: bool) -> sb.Experiment:
+def experiment(name: str, x: np.ndarray, law: str, known: bool, first: float) -> sb.Experiment:
     """A piece; of one that is predicted, the first samples alone are data."""
     begin = truth(law)
     if not known:
         begin = {key: value * share for (key, value), share in zip(begin.items(), BEGIN, strict=True)}
     scene, places = scene_of(np.array(STARTS[name]) + OFF, begin, law)
     seen = sb.Recording(x, np.arange(len(x)) / RATE, name=name)
-    part = {"fit": (0.0, FIRST), "held_out": (FIRST, SECONDS)} if name.startswith("predicted") else {}
+    part = {"fit": (0.0, first), "held_out": (first, SECONDS)} if name.startswith("predicted") else {}
     return sb.Experiment(
         scene=scene, recording=seen, markers=places, solver=SOLVERS[law], start_time=0.0, sigma=NOISE, name=name, **part
     )
 
 
-def fitted(pieces: dict[str, np.ndarray], law: str, known: bool = False) -> sb.FitResult:
+def fitted(pieces: dict[str, np.ndarray], law: str, known: bool = False, first: float = FIRST) -> sb.FitResult:
     """With the true numbers, or with those that the pieces show."""
     own = [sb.Parameter(name=name, private=True, unit=unit, scale=0.1) for name, unit in OWN.items()]
-    experiments = [experiment(name, x, law, known) for name, x in pieces.items()]
+    experiments = [experiment(name, x, law, known, first) for name, x in pieces.items()]
     sought = [] if known else truth(law)
     return sb.fit(experiments, parameters=[*sought, *own], windows=[], refine=False, profiles=False)
 
 
-def missed(result: sb.FitResult, clean: dict[str, np.ndarray], law: str) -> dict[str, float]:
+def missed(result: sb.FitResult, clean: dict[str, np.ndarray], law: str, first: float = FIRST) -> dict[str, float]:
     """Of each predicted piece, the rms distance along one coordinate between predicted and noisy markers in the plane,
     after its first samples, over the noise."""
     found = {}
@@ -176,7 +176,7 @@ def missed(result: sb.FitResult, clean: dict[str, np.ndarray], law: str) -> dict
         for place in places:
             origin, frame = place.body.pose(motion)
             x_found.append(origin + frame @ np.array(place.offset))
-        off = (np.stack(x_found, axis=1) - x)[round(FIRST * RATE) + 1 :, :, [0, 2]]
+        off = (np.stack(x_found, axis=1) - x)[round(first * RATE) + 1 :, :, [0, 2]]
         found[name] = float(np.hypot(np.sqrt((off**2).mean()), NOISE) / NOISE)
     return found
 
@@ -194,14 +194,14 @@ def without_truth(result: sb.FitResult, law: str, told: bool) -> list[str]:
     return outside
 
 
-def main(draws: int, law: str, known: bool) -> None:
+def main(draws: int, law: str, known: bool, first: float) -> None:
     clean = {name: markers(swing(start, law)) for name, start in STARTS.items()}
     rng, off, outside = np.random.default_rng(1), [], []
     for draw in range(draws):
         noisy = {name: x + NOISE * rng.standard_normal(x.shape) for name, x in clean.items()}
         shown = {name: x for name, x in noisy.items() if not known or name.startswith("predicted")}
-        result = fitted(shown, law, known)
-        off.append(list(missed(result, clean, law).values()))
+        result = fitted(shown, law, known, first)
+        off.append(list(missed(result, clean, law, first).values()))
         told = ", ".join(f"{a:.2f}" for a in off[-1])
         words = f"draw {draw}: predicted pieces off by {told} times the noise"
         if not known:
@@ -220,5 +220,6 @@ if __name__ == "__main__":
     parser.add_argument("--draws", type=int, default=1)
     parser.add_argument("--dry", action="store_true", help="dry friction in the hinges, not viscosity")
     parser.add_argument("--known", action="store_true", help="predict with the true numbers; nothing else is fitted")
+    parser.add_argument("--first", type=float, default=FIRST, metavar="S", help="predict from so many seconds")
     given = parser.parse_args()
-    main(given.draws, "friction" if given.dry else "viscosity", given.known)
+    main(given.draws, "friction" if given.dry else "viscosity", given.known, given.first)
