@@ -313,6 +313,14 @@ def test_a_sheet_with_a_title_above_its_table(tmp_path: Path, encoding: str) -> 
     assert got.mask.tolist() == [[True, True], [False, True]]
 
 
+@pytest.mark.parametrize("above", ["Time;12:30\n", "Subject;7\nTime;12:30\n", "time;a;;;b;;\n"])
+def test_a_time_of_day_above_the_header(tmp_path: Path, above: str) -> None:
+    """It was taken as the header, because it begins with a time and has numbers below it."""
+    header = "time;a_x;a_y;a_z;b_x;b_y;b_z\n"
+    (tmp_path / "take.csv").write_text(above + header + "0;1;2;3;4;5;6\n1;1;2;3;4;5;6\n")
+    assert Recording.load(tmp_path / "take.csv").markers == ("a", "b")
+
+
 @pytest.mark.parametrize(
     "header",
     [

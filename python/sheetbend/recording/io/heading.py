@@ -32,7 +32,10 @@ def first(rows: Sequence[tuple[int, str]], begins: Callable[[str], bool]) -> int
         begins: whether a line begins as a header does.
     """
     for k, (_, line) in enumerate(rows[:MOST]):
-        if begins(line) and any(_NUMBER.match(below) for _, below in rows[k + 1 : k + 3]):
+        below = [text for _, text in rows[k + 1 : k + 3]]
+        if below and begins(below[0]):  # such as the time of day above the header
+            continue
+        if begins(line) and any(map(_NUMBER.match, below)):
             return k
     return 0
 
