@@ -36,6 +36,12 @@ def mean_position(positions: Array) -> Array:
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
+def linear(knots: Array, values: Array, at: Array) -> Array:
+    """(at, ...) what is linear between knots, where it has values (knots, ...), and constant outside."""
+    columns = [np.interp(at, knots, column) for column in values.reshape(len(knots), -1).T]
+    return np.stack(columns, axis=1).reshape(len(at), *values.shape[1:])
+
+
 def interpolate(times: Array, positions: Array, at: Array, kind: Kind, max_gap: float) -> Array:
     """Positions of every marker at other times, NaN where its neighboring samples are too far apart.
 

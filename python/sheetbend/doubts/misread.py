@@ -14,7 +14,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.timeseries import mean_position
+from ..arrays.timeseries import linear, mean_position
 from ..arrays.types import Array
 from ..errors import SheetbendError
 from ..experiment.experiment import Experiment
@@ -123,10 +123,10 @@ def _clocked(x: Array, y: Array, seen: Mask, times: Array) -> Iterator[tuple[flo
     for rate in RATES:
         at = rate * times
         there = at <= times[-1]
-        moved = np.stack([np.interp(at[there], times, c) for c in x.reshape(len(times), -1).T], axis=-1)
+        moved = linear(times, x, at[there])
         before = _rms(x[there], y[there], seen[there])
         if before > 0.0:
-            left = plain * _rms(moved.reshape(-1, *x.shape[1:]), y[there], seen[there]) / before
+            left = plain * _rms(moved, y[there], seen[there]) / before
             if left < EXPLAINS * plain:
                 yield left, f"taken at {short(rate, 3)} times the told times, as of another frame rate"
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arrays.shortest_tree import tree
 from ..arrays.smoothing import smoothed
-from ..arrays.timeseries import default_max_gap, interpolate, mean_position
+from ..arrays.timeseries import default_max_gap, interpolate, linear, mean_position
 from ..arrays.types import Array
 from ..errors import RecordingError
 from ..recording.recording import Recording
@@ -254,7 +254,7 @@ def motion_of(recording: Recording) -> tuple[Array, Array]:
     whole = np.zeros_like(x)
     for k in range(x.shape[1]):
         seen = recording.mask[:, k]
-        whole[:, k] = np.stack([np.interp(t, t[seen], x[seen, k, axis]) for axis in range(3)], axis=1)
+        whole[:, k] = linear(t[seen], x[seen, k], t)
     reach = round(REST / 2 / float(np.median(np.diff(t))))
     known = all_around(known, reach)
     value, rate = smoothed(t, whole, REST / 2)

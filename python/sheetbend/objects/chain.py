@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_count, check_label, finite, is_number, points
+from ..arrays.timeseries import linear
 from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.quantities import ZERO_OR_MORE, product
@@ -26,7 +27,7 @@ def resample(polyline: ArrayLike, segments: int) -> Array:
         raise SceneError("points", "have no length", line.shape, "give at least two distinct points")
     s = np.concatenate([[0.0], np.cumsum(steps)])
     wanted = np.linspace(0.0, s[-1], segments + 1)
-    return np.stack([np.interp(wanted, s, line[:, k]) for k in range(3)], axis=1)
+    return linear(s, line, wanted)
 
 
 def straight_way(

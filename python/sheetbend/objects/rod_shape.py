@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import finite
+from ..arrays.timeseries import linear
 from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.quantities import Term
@@ -58,7 +59,7 @@ def initial_shape(
     v = finite(f"{name}.velocity", velocity, line.shape, SceneError)
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
     wanted = np.linspace(0.0, s[-1], segments + 1)
-    return shape, np.stack([np.interp(wanted, s, v[:, k]) for k in range(3)], axis=1)
+    return shape, linear(s, v, wanted)
 
 
 def fitted_to_length(shape: Array, link: float, held: Sequence[int]) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays.rotations import rotation_matrix
+from ..arrays.timeseries import linear
 from ..arrays.types import Array
 from ..scene.colliders import Collider, Motion
 from ..scene.distance_field import DistanceField
@@ -39,10 +40,7 @@ def collider_lines(scene: Scene, times: Array, positions: Array) -> dict[str, Ar
 def _poses(motion: Motion, times: Array) -> tuple[Array, Array]:
     """Positions (frames, 3) and rotations (frames, 3, 3); linear between knots, which pictures do not tell from
     cubic."""
-    x, r = (
-        np.stack([np.interp(times, motion.times, part[:, k]) for k in range(3)], axis=1)
-        for part in (motion.positions, motion.rotations)
-    )
+    x, r = (linear(motion.times, part, times) for part in (motion.positions, motion.rotations))
     return x, np.stack([rotation_matrix("rotation", vector) for vector in r])
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_increasing, finite
+from ..arrays.timeseries import linear
 from ..arrays.types import Array
 from ..errors import SceneError
 from ..quantities.expression import Expression, Factors, by_factors
@@ -25,12 +26,6 @@ def spread_over(forces: ArrayLike, shape: tuple[int, ...]) -> Array:
         return np.broadcast_to(given, shape)
     except ValueError as error:
         raise SceneError("add_force.forces", "has the wrong shape", given.shape, f"give {shape}") from error
-
-
-def between(knots: Array, values: Array, times: Array) -> Array:
-    """(times, ...) what is linear between knots, where it has values (knots, ...), and constant outside."""
-    columns = [np.interp(times, knots, column) for column in values.reshape(len(knots), -1).T]
-    return np.stack(columns, axis=1).reshape(len(times), *values.shape[1:])
 
 
 def shares(knots: Array, times: Array) -> list[list[tuple[int, float]]]:
@@ -78,7 +73,7 @@ class Forces:
             raise SceneError("add_force.particles", "are loaded already", sorted(twice), fix)
         self._join(t)
         self.particles += which
-        self._values += [between(t, f[:, k], self.times) for k in range(len(which))]
+        self._values += [linear(t, f[:, k], self.times) for k in range(len(which))]
 
     def push(self, particles: list[int], forces: Array, times: ArrayLike) -> None:
         """Add expressions (knots, k, 3) N to the forces on particles, which may be loaded already."""
@@ -112,7 +107,7 @@ class Forces:
         """
         self._join(times)
         self._load(particles)
-        at_knots = between(times, shapes, self.times)
+        at_knots = linear(times, shapes, self.times)
         parts: dict[Factors, list[tuple[int, float]]] = {}
         for particle, weight in zip(particles, weights, strict=True):
             for factors, share in weight.parts.items():
@@ -135,14 +130,14 @@ class Forces:
         if not self.particles or np.array_equal(before, self.times):
             return
         by = shares(before, self.times)
-        self._values = [between(before, f, self.times) for f in self._values]
+        self._values = [linear(before, f, self.times) for f in self._values]
         self._terms = [
             (p, at, axis, weight * share, factors)
             for p, knot, axis, share, factors in self._terms
             for at, weight in by[knot]
         ]
         self._varied = [
-            (nodes, share, between(before, shape, self.times), names, factors)
+            (nodes, share, linear(before, shape, self.times), names, factors)
             for nodes, share, shape, names, factors in self._varied
         ]
 

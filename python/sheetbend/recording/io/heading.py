@@ -5,7 +5,8 @@
     Time;X;Y;Z;X;Y;Z                         the header
     ms;mm;mm;mm;mm;mm;mm                     units
 
-The header is the first row that begins with the name of a time and has numbers below it, or below a row of units.
+The header is the first row that begins with the name of a time and has numbers below it, or below a row of units. A row
+directly above another one that begins so is none, such as the time of day.
 """
 
 from __future__ import annotations
